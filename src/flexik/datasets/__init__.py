@@ -1,0 +1,1 @@
+"""Grids, Parquet tables with units, and the parallel map."""

@@ -1,0 +1,1 @@
+"""Positioning errors of a method on test conditions."""

@@ -1,0 +1,1 @@
+"""Closed-form rigid kinematics, one file a mechanism (NumPy only)."""

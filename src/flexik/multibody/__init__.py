@@ -1,0 +1,1 @@
+"""Flexible models in static equilibrium; the only room that imports exudyn."""

@@ -1,0 +1,386 @@
+"""params.yaml as a validated model: a wrong value is one error that names its key.
+
+Every key is required, none has a default: what a stage computes follows from params.yaml alone,
+where DVC watches it. The names `size` and `nfiles` are never used: DVC's run cache ignores them.
+"""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from flexik.errors import ParameterError
+from flexik.files import checksum
+
+PARAMETERS_FILE = "params.yaml"
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Count = Annotated[int, Field(ge=1)]
+Seed = Annotated[int, Field(ge=0)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Vector = tuple[float, float]
+Interval = tuple[float, float]
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+
+
+class Model(BaseModel):
+    """Base of all sections: frozen, unknown keys refused, numbers finite and not from text."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=False, allow_inf_nan=False, coerce_numbers_to_str=False
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_text_numbers(cls, data: Any) -> Any:
+        # YAML 1.1 reads 1e-5 as text, which pydantic would turn into a number behind one's back
+        if isinstance(data, dict):
+            for key, value in data.items():
+                for entry in value if isinstance(value, list) else [value]:
+                    if isinstance(entry, bool) or (isinstance(entry, str) and _is_number(entry)):
+                        raise ValueError(f"{key}: {entry!r} is no YAML number (write 1.0e-5, 1.0e+6)")
+        return data
+
+
+class Parallel(Model):
+    """Where the parallel stages compute."""
+
+    n_workers: Annotated[int, Field(ge=0)]
+    scheduler: str | None
+
+
+class Geometry(Model):
+    """Rigid kinematics, see mechanisms.crane.CraneGeometry; m."""
+
+    lift_pivot: Vector
+    lift_cylinder_base: Vector
+    lift_cylinder_head: Vector
+    jib_pivot: Vector
+    rocker_pivot: Vector
+    jib_cylinder_base: Vector
+    coupler_pin: Vector
+    extension_start: Vector
+    lift_cylinder_length: Positive
+    jib_cylinder_length: Positive
+    rocker_length: Positive
+    coupler_length: Positive
+    stroke_maximum: tuple[Positive, Positive, Positive]
+
+
+class BeamModel(Model):
+    """One beam, see multibody.structure.Beam."""
+
+    section: str
+    span: Interval
+    mass: Positive
+    centre_of_mass: float
+    mass_span: Interval
+    mass_offset: float
+    n_elements: Count
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.span[0] <= self.mass_span[0] < self.mass_span[1] <= self.span[1]:
+            raise ValueError("mass_span: must increase and lie within span")
+        if not self.mass_span[0] < self.centre_of_mass < self.mass_span[1]:
+            raise ValueError("centre_of_mass: must lie within mass_span")
+        return self
+
+
+class Beams(Model):
+    """The four flexible links."""
+
+    pillar: BeamModel
+    lift: BeamModel
+    jib: BeamModel
+    extension: BeamModel
+
+
+class RodModel(Model):
+    """A rigid two-pin link."""
+
+    mass: Positive
+    centre_of_mass: NotNegative
+
+
+class Structure(Model):
+    """What bends and weighs, see multibody.crane.CraneStructure."""
+
+    element: Literal["geometrically_exact", "ancf"]
+    youngs_modulus: Positive
+    gravity: Positive
+    lift_axis_height: float
+    jib_axis_height: float
+    extension_overlap: Positive
+    front_pad: Positive
+    beams: Beams
+    rocker: RodModel
+    coupler: RodModel
+
+
+class Calibration(Model):
+    """Fit of the ground spring."""
+
+    published_mean_error: Positive
+    stiffness_range: tuple[Positive, Positive]
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.stiffness_range[0] < self.stiffness_range[1]:
+            raise ValueError("stiffness_range: must increase")
+        return self
+
+
+class MeshStudy(Model):
+    """Samples and refinements of the mesh study."""
+
+    n_samples: Count
+    refinements: Annotated[list[Count], Field(min_length=2)]
+    seed: Seed
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.refinements != sorted(set(self.refinements)):
+            raise ValueError("refinements: must increase, the last one being the reference")
+        return self
+
+
+class Illustration(Model):
+    """Sample drawn in the picture of the crane: strokes in m, payload in kg."""
+
+    strokes: tuple[NotNegative, NotNegative, NotNegative]
+    payload: NotNegative
+    exaggeration: Positive
+
+
+class Axis(Model):
+    """Evenly spaced values from minimum to maximum."""
+
+    minimum: NotNegative
+    maximum: NotNegative
+    increment: Positive
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> Self:
+        steps = (self.maximum - self.minimum) / self.increment
+        if self.maximum < self.minimum or abs(steps - round(steps)) > 1e-6:
+            raise ValueError("increment: maximum - minimum must be a whole number of increments")
+        return self
+
+
+class Grid(Model):
+    """Training grid, table 4.1."""
+
+    lift: Axis
+    jib: Axis
+    extension: Axis
+    payload: Axis
+    minimum_tip_x: float
+    maximum_failed_share: Share
+
+
+class Selection(Model):
+    """Random set that chooses among restarts."""
+
+    n_samples: Count
+    payload: tuple[NotNegative, NotNegative]
+    seed: Seed
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.payload[0] < self.payload[1]:
+            raise ValueError("payload: must increase")
+        return self
+
+
+class Trainer(Model):
+    """Levenberg-Marquardt, see learning.levenberg_marquardt."""
+
+    n_iterations: Count
+    mu: Positive
+    mu_decrease: Annotated[float, Field(gt=0, lt=1)]
+    mu_increase: Annotated[float, Field(gt=1)]
+    mu_maximum: Positive
+    goal: NotNegative
+    minimum_gradient: NotNegative
+    minimum_progress: Annotated[float, Field(ge=0, lt=1)]
+    progress_window: Count
+
+
+class NetworkModel(Model):
+    """What a network learns, how large it is, how it is trained."""
+
+    kind: Literal["deflection"]
+    n_hidden: Count
+    activation: Literal["tanh", "logistic"]
+    n_restarts: Count
+    seed: Seed
+    trainer: Trainer
+
+
+class Evaluation(Model):
+    """Test conditions: every point with every payload."""
+
+    points: Annotated[list[Vector], Field(min_length=1)]
+    payloads: Annotated[list[NotNegative], Field(min_length=1)]
+
+
+class MethodModel(Model):
+    """A positioning method and what it is built from."""
+
+    method: Literal["combined"]
+    network: Name
+    inverse: Literal["closed_form", "genetic"]
+    n_corrections: Count
+
+
+class Genetic(Model):
+    """Genetic rigid inverse, see positioning.genetic."""
+
+    n_individuals: Annotated[int, Field(ge=2)]
+    n_current: Annotated[int, Field(ge=0)]
+    tolerance: Positive
+    n_generations: Count
+    seed: Seed
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if self.n_current > self.n_individuals:
+            raise ValueError("n_current: must not exceed n_individuals")
+        return self
+
+
+class Crane(Model):
+    """The log crane."""
+
+    geometry: Geometry
+    structure: Structure
+    calibration: Calibration
+    mesh_study: MeshStudy
+    illustration: Illustration
+    grid: Grid
+    selection: Selection
+    networks: Annotated[dict[Name, NetworkModel], Field(min_length=1)]
+    evaluation: Evaluation
+    methods: dict[Name, MethodModel]
+    genetic: Genetic
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        reach = dict(zip(("lift", "jib", "extension"), self.geometry.stroke_maximum, strict=True))
+        for name, longest in reach.items():
+            if getattr(self.grid, name).maximum > longest + 1e-9:
+                raise ValueError(f"grid.{name}.maximum: lies beyond the cylinder, {longest} m")
+        for stroke, (name, longest) in zip(self.illustration.strokes, reach.items(), strict=True):
+            if stroke > longest:
+                raise ValueError(f"illustration.strokes: {name} beyond the cylinder, {longest} m")
+        if "none" in self.methods:
+            raise ValueError("methods.none: the name is taken by the uncompensated crane")
+        for label, method in self.methods.items():
+            if method.network not in self.networks:
+                known = ", ".join(self.networks)
+                raise ValueError(
+                    f"methods.{label}.network: there is no network {method.network!r} ({known})"
+                )
+        for number, target in enumerate(self.evaluation.points):
+            if target in self.evaluation.points[:number]:
+                raise ValueError(f"evaluation.points.{number}: {target} is there twice")
+        return self
+
+
+class Parameters(Model):
+    """The whole of params.yaml."""
+
+    parallel: Parallel
+    crane: Crane
+
+
+def load_parameters(path: Path | str = PARAMETERS_FILE) -> Parameters:
+    """Read and validate `path`.
+
+    Raises ParameterError, one line a wrong key, if the file is missing, no YAML, or a value is
+    unknown, missing or out of range.
+    """
+    return validate(read_yaml(path), str(path))
+
+
+def read_yaml(path: Path | str) -> dict[str, Any]:
+    """Mapping in the YAML file `path`; raises ParameterError if there is none or a key is doubled."""
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise ParameterError(f"{path}: cannot be read ({error.strerror})") from None
+    try:
+        data = yaml.load(text, Loader=_UniqueKeyLoader)
+    except yaml.YAMLError as error:
+        detail = " ".join(str(error).split())
+        raise ParameterError(f"{path}: no valid YAML: {detail}") from None
+    if not isinstance(data, dict):
+        raise ParameterError(f"{path}: expected a mapping of keys to values")
+    return data
+
+
+def validate(data: dict[str, Any], source: str = PARAMETERS_FILE) -> Parameters:
+    """`data` as Parameters; raises ParameterError naming `source` and the wrong keys."""
+    try:
+        return Parameters.model_validate(data)
+    except ValidationError as error:
+        lines = []
+        for detail in error.errors():
+            key = ".".join(str(part) for part in detail["loc"]) or "top level"
+            message = detail["msg"].removeprefix("Value error, ")
+            if detail["type"] == "value_error":  # our own: "key within the section: what is wrong"
+                within, _, message = message.partition(": ")
+                key = f"{key}.{within}"
+            given = detail["input"]
+            shown = f", got {given!r}" if not isinstance(given, dict | list | BaseModel) else ""
+            lines.append(f"{source}: {key}: {message}{shown}")
+        raise ParameterError("\n".join(lines)) from None
+
+
+def overlay(base: dict[str, Any], changes: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """`base` with the keys of `changes` replaced, mapping by mapping.
+
+    Raises ParameterError for a key that `base` does not have.
+    """
+    result = dict(base)
+    for key, value in changes.items():
+        if key not in base:
+            raise ParameterError(f"profile: {prefix}{key} is no key of {PARAMETERS_FILE}")
+        nested = isinstance(value, dict) and isinstance(base[key], dict)
+        result[key] = overlay(base[key], value, f"{prefix}{key}.") if nested else value
+    return result
+
+
+def parameters_checksum(sections: Iterable[BaseModel]) -> str:
+    """SHA-256 of the values of `sections`, the same for equal values."""
+    return checksum(*(json.dumps(s.model_dump(mode="json"), sort_keys=True) for s in sections))
+
+
+class _UniqueKeyLoader(yaml.SafeLoader):
+    """Refuses a key that stands twice in a mapping."""
+
+
+def _unique_mapping(loader: _UniqueKeyLoader, node: yaml.MappingNode) -> dict[Any, Any]:
+    keys = [loader.construct_object(key) for key, _ in node.value]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise yaml.constructor.ConstructorError(
+                None, None, f"key {key!r} stands twice", node.start_mark
+            )
+    return loader.construct_mapping(node, deep=True)
+
+
+_UniqueKeyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _unique_mapping)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,26 @@
+"""Methods from target and payload to strokes, one file a method."""
+
+from collections.abc import Callable
+
+from flexik.errors import ParameterError
+from flexik.positioning import combined, none
+from flexik.positioning.ingredients import Ingredients
+from flexik.positioning.method import Method
+
+METHODS: dict[str, Callable[..., Method]] = {
+    "none": none.build,
+    "combined": combined.build,
+}
+
+
+def build_method(name: str, ingredients: Ingredients, **options: object) -> Method:
+    """Build method `name` of METHODS, with its own options.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such method; the known names are listed.
+    """
+    if name not in METHODS:
+        raise ParameterError(f"method {name!r} is not known, expected one of {sorted(METHODS)}")
+    return METHODS[name](ingredients, **options)

@@ -1,0 +1,1 @@
+"""Tables, figures and report pages; reads tables, never trains."""

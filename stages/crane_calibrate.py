@@ -1,0 +1,49 @@
+"""Fit the ground spring so that the uncompensated mean error is the published one.
+
+Reads params.yaml: crane.geometry, crane.structure, crane.evaluation, crane.calibration.
+Writes data/crane/calibration.json: spring stiffness, statistics of the uncompensated errors.
+"""
+
+import functools
+from pathlib import Path
+
+import pandas as pd
+
+from flexik import stage
+from flexik.evaluation.calibration import fit_spring
+from flexik.evaluation.conditions import all_conditions
+from flexik.evaluation.errors import evaluate, statistics
+from flexik.files import write_json
+from flexik.multibody.assembly import flexible_crane
+from flexik.multibody.crane import tips
+from flexik.parameters import load_parameters
+from flexik.positioning.initial import initial_positions
+from flexik.positioning.none import Uncompensated
+from flexik.positioning.rigid_inverse import closed_form
+
+OUTPUT = Path("data/crane/calibration.json")
+
+
+def main() -> None:
+    """Run the stage."""
+    crane = load_parameters().crane
+    conditions = all_conditions(crane.evaluation.points, crane.evaluation.payloads)
+    geometry = flexible_crane(crane, 1.0).geometry
+    initial = initial_positions(geometry, conditions.targets)
+    method = Uncompensated(closed_form(geometry))
+
+    def uncompensated(stiffness: float) -> pd.DataFrame:
+        flexible_tip = functools.partial(tips, flexible_crane(crane, stiffness))
+        return evaluate(method, conditions, initial, flexible_tip)
+
+    settings = crane.calibration
+    fit = fit_spring(uncompensated, settings.published_mean_error, settings.stiffness_range)
+    print(f"ground spring {fit.spring_stiffness:.6g} N m/rad")
+    write_json(
+        OUTPUT,
+        {"spring_stiffness": fit.spring_stiffness, "uncompensated": statistics(fit.errors)},
+    )
+
+
+if __name__ == "__main__":
+    stage.run(main)

@@ -1,0 +1,41 @@
+"""Solve the sample that the picture of the crane shows.
+
+Reads params.yaml: crane.geometry, crane.structure, crane.illustration;
+data/crane/calibration.json. Writes data/crane/shape.json: node positions with and without load.
+"""
+
+from pathlib import Path
+
+from flexik import stage
+from flexik.files import read_json, write_json
+from flexik.mechanisms.crane import forward
+from flexik.multibody.assembly import flexible_crane
+from flexik.multibody.crane import equilibrium, reference_shapes
+from flexik.parameters import load_parameters
+
+OUTPUT = Path("data/crane/shape.json")
+
+
+def main() -> None:
+    """Run the stage."""
+    crane = load_parameters().crane
+    model = flexible_crane(crane, read_json("data/crane/calibration.json")["spring_stiffness"])
+    strokes, payload = crane.illustration.strokes, crane.illustration.payload
+    solved = equilibrium(model, strokes, payload)
+    write_json(
+        OUTPUT,
+        {
+            "strokes": strokes,
+            "payload": payload,
+            "exaggeration": crane.illustration.exaggeration,
+            "beams": {name: nodes.tolist() for name, nodes in solved.shapes.items()},
+            "reference": {n: x.tolist() for n, x in reference_shapes(model, strokes).items()},
+            "tip": solved.tip.tolist(),
+            "rigid_tip": forward(model.geometry, [strokes])[0].tolist(),
+            "forces": solved.forces,
+        },
+    )
+
+
+if __name__ == "__main__":
+    stage.run(main)

@@ -1,0 +1,42 @@
+"""The log crane and its test conditions, as params.yaml has them."""
+
+import numpy as np
+import pytest
+
+from flexik.mechanisms.crane import CraneGeometry
+
+
+@pytest.fixture(scope="session")
+def geometry():
+    return CraneGeometry(
+        lift_pivot=(-0.09, 1.115),
+        lift_cylinder_base=(0.26, -1.04),
+        lift_cylinder_head=(0.3025, -0.105),
+        jib_pivot=(2.88, -0.024),
+        rocker_pivot=(-0.19, -0.015),
+        jib_cylinder_base=(-1.4165, 0.203),
+        coupler_pin=(-0.095, 0.24),
+        extension_start=(2.141, 0.008),
+        lift_cylinder_length=0.8,
+        jib_cylinder_length=1.037,
+        rocker_length=0.45,
+        coupler_length=0.48,
+        stroke_maximum=(0.535, 0.78, 1.6),
+    )
+
+
+@pytest.fixture(scope="session")
+def points():
+    return np.array(
+        [
+            *([1, 7], [2, 7], [1, 6], [1, -2], [2, 2], [2, -3.95], [6, -1], [6, 3], [4, 5]),
+            *([3, -1], [4, 1], [4, -3], [1, 0], [4, 3], [6, 1], [3, 4], [3, 6], [5, -2], [5, 0]),
+            *([5, 2], [5, 4], [1, -3], [1, -1], [1, 1], [1, 2]),
+        ],
+        dtype=float,
+    )
+
+
+@pytest.fixture(scope="session")
+def payloads():
+    return np.array([30.0, 120.0, 260.0, 310.0, 470.0])

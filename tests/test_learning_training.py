@@ -1,0 +1,218 @@
+"""The door: data in, the network with the least selection error out."""
+
+import functools
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flexik.errors import DataError, TrainingError
+from flexik.learning import levenberg_marquardt, training
+from flexik.learning.levenberg_marquardt import LevenbergMarquardt, StopReason
+from flexik.learning.perceptron import Quantity
+from flexik.learning.training import Architecture, train, train_best
+
+INPUTS = (Quantity("x", "m"), Quantity("payload", "kg"))
+OUTPUTS = (Quantity("lift_stroke", "m"), Quantity("jib_stroke", "m"))
+QUICK = LevenbergMarquardt(n_iterations=15)
+
+
+def data(n: int, seed: int = 0, noise: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Smooth data of uneven scales: metres near 3, kilograms to 500, strokes of millimetres."""
+    generator = np.random.default_rng(seed)
+    inputs = generator.uniform([2.0, 0.0], [4.0, 500.0], (n, 2))
+    x, payload = inputs[:, 0], inputs[:, 1] / 500.0
+    outputs = 1e-3 * np.column_stack([np.sin(2.0 * x) * payload, np.cos(x) + payload**2])
+    return inputs, outputs + 1e-3 * noise * generator.normal(size=outputs.shape)
+
+
+def best(map_function=map, seed=1, n_restarts=6, settings=QUICK):
+    return train_best(
+        *data(30, noise=0.1), *data(25, seed=9), Architecture(6), settings, seed, n_restarts,
+        INPUTS, OUTPUTS, map_function,
+    )  # fmt: skip
+
+
+def reversed_map(function, items):
+    """Last item first, results out of order."""
+    return [function(item) for item in reversed(list(items))]
+
+
+def process_map(function, items):
+    """Send function and results through pickle, as worker processes do."""
+    for item in items:
+        there = pickle.loads(pickle.dumps(function))
+        yield pickle.loads(pickle.dumps(there(item)))
+
+
+def selection_error(network, inputs, outputs) -> float:
+    """Root mean square of errors as fractions of half the training range, by hand."""
+    half = np.ptp(data(30, noise=0.1)[1], axis=0) / 2.0
+    return np.sqrt(np.mean(((network.predict(inputs) - outputs) / half) ** 2))
+
+
+@pytest.mark.parametrize("activation", ["tanh", "logistic"])
+def test_learns_in_physical_units(activation):
+    network, record = train(
+        *data(300), Architecture(8, activation), LevenbergMarquardt(n_iterations=200), 0,
+        INPUTS, OUTPUTS,
+    )  # fmt: skip
+    inputs, outputs = data(200, seed=1)
+    # strokes span 2 mm; a network in the wrong units would miss by far more
+    assert np.sqrt(np.mean((network.predict(inputs) - outputs) ** 2)) < 0.005e-3
+    assert (network.inputs, network.outputs) == (INPUTS, OUTPUTS)
+    assert (network.n_hidden, network.activation) == (8, activation)
+    assert (record.trainer, record.seed, record.selection_error) == ("levenberg_marquardt", 0, None)
+    assert record.seconds > 0.0
+
+
+def test_record_holds_the_error_of_the_network():
+    network, record = train(*data(60), Architecture(4), QUICK, 3, INPUTS, OUTPUTS)
+    inputs, outputs = data(60)
+    normalisation = network.output_normalisation
+    residuals = normalisation.to_unit(network.predict(inputs)) - normalisation.to_unit(outputs)
+    assert record.errors[-1] == pytest.approx(np.mean(residuals**2), rel=1e-9)
+    assert record.stop_reason is StopReason.ITERATIONS
+    assert len(record.errors) == 16
+
+
+def test_same_seed_same_network_other_seed_another():
+    runs = [train(*data(60), Architecture(4), QUICK, seed, INPUTS, OUTPUTS) for seed in (3, 3, 4)]
+    np.testing.assert_array_equal(runs[0][0].hidden_weights, runs[1][0].hidden_weights)
+    assert runs[0][1] == runs[1][1]
+    assert runs[0][1].errors != runs[2][1].errors
+
+
+def test_training_is_the_first_restart():
+    alone = train(*data(30, noise=0.1), Architecture(6), QUICK, 1, INPUTS, OUTPUTS)
+    _, _, records = best()
+    assert alone[1].errors == records[0].errors
+
+
+def test_the_selection_error_chooses_not_the_training_error():
+    network, record, records = best()
+    by_selection = min(records, key=lambda r: r.selection_error)
+    by_training = min(records, key=lambda r: r.errors[-1])
+    # the case is only a case when the two disagree
+    assert by_selection.restart != by_training.restart
+    assert record == by_selection
+    assert record.selection_error == pytest.approx(selection_error(network, *data(25, seed=9)))
+    assert [r.restart for r in records] == list(range(6))
+    assert {r.n_restarts for r in records} == {6}
+
+
+@pytest.mark.parametrize("map_function", [reversed_map, process_map])
+def test_order_and_workers_do_not_matter(map_function):
+    expected, result = best(), best(map_function)
+    for name in ("hidden_weights", "hidden_bias", "output_weights", "output_bias"):
+        np.testing.assert_array_equal(getattr(result[0], name), getattr(expected[0], name))
+    assert result[1:] == expected[1:]
+
+
+def test_equal_restarts_give_the_first(monkeypatch):
+    original = training._run
+    monkeypatch.setattr(
+        training,
+        "_run",
+        lambda task, k: (lambda n, r: (n, replace(r, selection_error=1.0)))(*original(task, k)),
+    )
+    assert best(reversed_map)[1].restart == 0
+
+
+def test_more_restarts_keep_the_earlier_ones():
+    few, many = best(n_restarts=2)[2], best(n_restarts=4)[2]
+    assert [r.errors for r in few] == [r.errors for r in many[:2]]
+
+
+def overflowing(original, *restarts_to_break):
+    """Make initial weights that overflow in the chosen draws."""
+    draws = iter(range(100))
+
+    def draw(*arguments):
+        weights = original(*arguments)
+        factor = 1e200 if next(draws) in restarts_to_break else 1.0
+        return replace(weights, output=weights.output * factor)
+
+    return draw
+
+
+def test_a_failed_restart_is_recorded_and_not_chosen(monkeypatch):
+    winner = best()[1].restart
+    broken = overflowing(levenberg_marquardt.initial_weights, winner)
+    monkeypatch.setattr(levenberg_marquardt, "initial_weights", broken)
+    _, record, records = best()
+    assert record.restart != winner
+    assert len(records) == 6
+    failed = records[winner]
+    assert (failed.stop_reason, failed.errors) == (StopReason.NON_FINITE, ())
+    assert failed.selection_error is None
+
+
+def test_no_usable_network_names_network_seed_and_reason(monkeypatch):
+    broken = overflowing(levenberg_marquardt.initial_weights, *range(100))
+    monkeypatch.setattr(levenberg_marquardt, "initial_weights", broken)
+    message = r"lift_stroke, jib_stroke with 6 tanh units, seed 1: .*non_finite"
+    with pytest.raises(TrainingError, match=message):
+        best()
+    with pytest.raises(TrainingError, match=r"seed 7: .*non_finite"):
+        train(*data(60), Architecture(4), QUICK, 7, INPUTS, OUTPUTS)
+
+
+def test_a_constant_column_is_no_obstacle():
+    inputs, outputs = data(60)
+    inputs[:, 1] = 250.0
+    outputs[:, 0] = 0.7
+    network, record = train(inputs, outputs, Architecture(4), QUICK, 0, INPUTS, OUTPUTS)
+    assert record.errors[-1] < record.errors[0]
+    np.testing.assert_array_equal(network.predict(inputs)[:, 0], 0.7)
+
+
+def with_value(array: np.ndarray, value: float) -> np.ndarray:
+    changed = array.copy()
+    changed[17, 1] = value
+    return changed
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda x, y: (with_value(x, np.nan), y), "inputs, sample 17: payload is nan"),
+        (lambda x, y: (x, with_value(y, np.inf)), "outputs, sample 17: jib_stroke is inf"),
+        (lambda x, y: (x[:-1], y), "inputs have 39 samples, outputs 40"),
+        (lambda x, y: (x[:0], y[:0]), r"inputs have shape \(0, 2\)"),
+        (lambda x, y: (x[:, :1], y), r"inputs have shape \(40, 1\), expected \(n, 2\).*x, payload"),
+        (lambda x, y: (x, y[:, 0]), r"outputs have shape \(40,\)"),
+    ],
+)
+def test_bad_data_is_named(change, message):
+    bad, good = change(*data(40)), data(40)
+    common = (Architecture(4), QUICK, 0)
+    with pytest.raises(DataError, match=f"training {message}"):
+        train(*bad, *common, INPUTS, OUTPUTS)
+    with pytest.raises(DataError, match=f"selection {message}"):
+        train_best(*good, *bad, *common, 1, INPUTS, OUTPUTS)
+
+
+def test_more_weights_than_numbers_to_fit():
+    start = functools.partial(
+        train, settings=QUICK, seed=0, input_quantities=INPUTS, output_quantities=OUTPUTS
+    )
+    # 4 hidden units have 4 * 3 + 2 * 5 = 22 weights, 11 samples hold 22 numbers
+    start(*data(11), Architecture(4))
+    with pytest.raises(TrainingError, match="4 hidden units have 22 weights, more than the 20"):
+        start(*data(10), Architecture(4))
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: Architecture(0), "n_hidden=0"),
+        (lambda: Architecture(3, "relu"), "activation='relu'"),
+        (lambda: best(seed=-1), "seed=-1"),
+        (lambda: best(n_restarts=0), "n_restarts=0"),
+    ],
+)
+def test_settings_out_of_range_are_named(call, message):
+    with pytest.raises(TrainingError, match=message):
+        call()
