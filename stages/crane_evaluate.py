@@ -26,7 +26,7 @@ from flexik.positioning import build_method
 from flexik.positioning.genetic import GeneticSettings, genetic
 from flexik.positioning.ingredients import Ingredients
 from flexik.positioning.initial import initial_positions
-from flexik.positioning.method import Method
+from flexik.positioning.method import Method, Network
 from flexik.positioning.rigid_inverse import RigidInverse, closed_form
 
 FOLDER = Path("data/crane")
@@ -69,7 +69,7 @@ def chosen_method(
         "closed_form": closed_form(geometry),
         "genetic": genetic(geometry, GeneticSettings(**crane.genetic.model_dump())),
     }
-    networks = {crane.networks[chosen.network].kind: network}
+    networks: dict[str, Network] = {crane.networks[chosen.network].kind: network}
     ingredients = Ingredients(geometry, inverses[chosen.inverse], networks)
     return build_method(chosen.method, ingredients, n_corrections=chosen.n_corrections)
 

@@ -6,6 +6,8 @@ data/crane/calibration.json. Writes data/crane/shape.json: node positions with a
 
 from pathlib import Path
 
+import numpy as np
+
 from flexik import stage
 from flexik.files import read_json, write_json
 from flexik.mechanisms.crane import forward
@@ -31,7 +33,7 @@ def main() -> None:
             "beams": {name: nodes.tolist() for name, nodes in solved.shapes.items()},
             "reference": {n: x.tolist() for n, x in reference_shapes(model, strokes).items()},
             "tip": solved.tip.tolist(),
-            "rigid_tip": forward(model.geometry, [strokes])[0].tolist(),
+            "rigid_tip": forward(model.geometry, np.array([strokes]))[0].tolist(),
             "forces": solved.forces,
         },
     )

@@ -46,7 +46,7 @@ def cantilever(element, beam, force, offset=0.0, upright=False):
 
 
 def elastica(force):
-    """Tip displacement of an inextensible cantilever under a dead vertical end force, by shooting."""
+    """Tip displacement of an inextensible cantilever under a dead vertical end force."""
 
     def slope(s, y):
         return np.array([y[1], force / EI * np.cos(y[0])])

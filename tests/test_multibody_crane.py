@@ -30,7 +30,8 @@ def samples(geometry):
 @pytest.fixture(scope="module")
 def linear(samples):
     structure = virtual_work.nominal_structure(SPRING)
-    return [virtual_work.solve(structure, *row) for row in zip(samples.strokes, samples.payload)]
+    rows = zip(samples.strokes, samples.payload, strict=True)
+    return [virtual_work.solve(structure, *row) for row in rows]
 
 
 @pytest.fixture(scope="module")
@@ -57,9 +58,7 @@ def test_tip_deflection_is_that_of_statics_on_the_deformed_crane(crane, samples,
 
 
 def test_forces_and_reactions_are_those_of_statics(crane, samples, nonlinear):
-    for strokes, payload, expected in zip(
-        samples.strokes, samples.payload, nonlinear, strict=True
-    ):
+    for strokes, payload, expected in zip(samples.strokes, samples.payload, nonlinear, strict=True):
         found = equilibrium(crane, strokes, payload)
         largest = max(abs(force) for force in expected.forces.values())
         for name in RODS:

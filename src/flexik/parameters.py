@@ -42,7 +42,9 @@ class Model(BaseModel):
             for key, value in data.items():
                 for entry in value if isinstance(value, list) else [value]:
                     if isinstance(entry, bool) or (isinstance(entry, str) and _is_number(entry)):
-                        raise ValueError(f"{key}: {entry!r} is no YAML number (write 1.0e-5, 1.0e+6)")
+                        raise ValueError(
+                            f"{key}: {entry!r} is no YAML number (write 1.0e-5, 1.0e+6)"
+                        )
         return data
 
 
@@ -309,7 +311,7 @@ def load_parameters(path: Path | str = PARAMETERS_FILE) -> Parameters:
 
 
 def read_yaml(path: Path | str) -> dict[str, Any]:
-    """Mapping in the YAML file `path`; raises ParameterError if there is none or a key is doubled."""
+    """Mapping in the YAML file `path`; raises ParameterError if it is none or doubles a key."""
     try:
         text = Path(path).read_text(encoding="utf-8")
     except OSError as error:

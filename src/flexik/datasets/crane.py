@@ -116,7 +116,9 @@ def random_samples(
         if len(strokes) >= n_samples:
             break
     else:
-        raise ParameterError(f"minimum_tip_x: hardly any pose has its tip at x >= {minimum_tip_x} m")
+        raise ParameterError(
+            f"minimum_tip_x: hardly any pose has its tip at x >= {minimum_tip_x} m"
+        )
     return Samples(strokes[:n_samples], rng.uniform(*payload, n_samples))
 
 

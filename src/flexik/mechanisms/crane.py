@@ -126,7 +126,9 @@ def pose(geometry: CraneGeometry, strokes: Array) -> CranePose:
     jib_pivot = from_lift(geometry.jib_pivot)
 
     def from_jib(point: Vector | Array) -> Array:
-        return jib_pivot + rotate(jib_angle, np.broadcast_to(np.asarray(point, dtype=float), (n, 2)))
+        return jib_pivot + rotate(
+            jib_angle, np.broadcast_to(np.asarray(point, dtype=float), (n, 2))
+        )
 
     return CranePose(
         lift_cylinder_base=pivot + np.array(geometry.lift_cylinder_base),
@@ -319,7 +321,8 @@ def _inverse_branch(
     unsolved = np.isnan(strokes).any(axis=1)
     strokes[unsolved] = np.nan
     with np.errstate(invalid="ignore"):
-        inside = ((strokes >= -STROKE_TOLERANCE) & (strokes <= maximum + STROKE_TOLERANCE)).all(1)
+        allowed = (strokes >= -STROKE_TOLERANCE) & (strokes <= maximum + STROKE_TOLERANCE)
+    inside = np.all(allowed, axis=1)
     strokes = np.where(inside[:, None], np.clip(strokes, 0.0, maximum), strokes)
     status = np.where(unsolved, OUT_OF_REACH, np.where(inside, REACHED, STROKE_LIMIT))
     return InverseSolution(strokes, status)

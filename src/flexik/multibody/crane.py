@@ -133,9 +133,7 @@ def equilibrium(
     return model.equilibrium()
 
 
-def reference_shapes(
-    crane: FlexibleCrane, strokes: Sequence[float] | Array
-) -> dict[str, Array]:
+def reference_shapes(crane: FlexibleCrane, strokes: Sequence[float] | Array) -> dict[str, Array]:
     """Node positions (k, 2) in m by beam in the rigid pose at `strokes` (3,) in m."""
     model = CraneModel(crane, float(strokes[2]))
     model.place(np.asarray(strokes, dtype=float))
@@ -173,9 +171,7 @@ class CraneModel:
         self.strokes = strokes
         for name, (origin, angle) in self._frames(rigid).items():
             self.beams[name].move(origin, angle)
-        self.system.SetNodeParameter(
-            self._head, "referenceCoordinates", list(rigid.rocker_head[0])
-        )
+        self.system.SetNodeParameter(self._head, "referenceCoordinates", list(rigid.rocker_head[0]))
         geometry = self.crane.geometry
         for name, length in (
             ("lift_cylinder", geometry.lift_cylinder_length + strokes[0]),
@@ -191,11 +187,11 @@ class CraneModel:
         self.system.SetLoadParameter(self._payload_load, "loadVector", force)
         self._predict(payload)
         try:
-            solved = exu.MainSolverStatic().SolveSystem(self.system, _SETTINGS)
+            solved = exu.MainSolverStatic().SolveSystem(self.system, _SETTINGS)  # type: ignore[call-arg,misc]
         except exu.SolverError:  # a singular matrix
             solved = False
         data = self.system.systemData
-        solution = data.GetODE2Coordinates(), data.GetAECoordinates()
+        solution = np.array(data.GetODE2Coordinates()), np.array(data.GetAECoordinates())
         if not solved or not np.isfinite(solution[0]).all():
             self.system.Assemble()  # back to the unloaded pose
             self._solved = []
@@ -212,8 +208,8 @@ class CraneModel:
         step = (payload - m1) / (m1 - m0) if m1 != m0 else 0.0
         ode2, ae = (b + step * (b - a) for a, b in zip(q0, q1, strict=True))
         data = self.system.systemData
-        data.SetODE2Coordinates(ode2, configuration=exu.ConfigurationType.Initial)
-        data.SetAECoordinates(ae, configuration=exu.ConfigurationType.Initial)
+        data.SetODE2Coordinates(list(ode2), configuration=exu.ConfigurationType.Initial)
+        data.SetAECoordinates(list(ae), configuration=exu.ConfigurationType.Initial)
 
     def tip(self) -> Array:
         """Tip (2,) in m of the last solution."""
@@ -320,9 +316,7 @@ class CraneModel:
         return self.beams["pillar"].marker(float(y), -float(x))
 
     def _on_lift(self, point: Vector) -> int:
-        return self.beams["lift"].marker(
-            point[0], point[1] - self.crane.structure.lift_axis_height
-        )
+        return self.beams["lift"].marker(point[0], point[1] - self.crane.structure.lift_axis_height)
 
     def _on_jib(self, point: Vector) -> int:
         return self.beams["jib"].marker(point[0], point[1] - self.crane.structure.jib_axis_height)

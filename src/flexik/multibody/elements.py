@@ -29,7 +29,7 @@ class PlacedBeam:
     _arms: dict[int, int] = field(default_factory=dict)
 
     def marker(self, abscissa: float, offset: float = 0.0) -> int:
-        """Marker at `abscissa` in m, `offset` to the left of the axis, on a rigid arm from a node."""
+        """Marker at `abscissa`, `offset` left of the axis, in m, on a rigid arm from a node."""
         k = int(np.argmin(np.abs(self.stations - abscissa)))
         ahead = abscissa - self.stations[k]
         if self.ancf:
@@ -45,7 +45,7 @@ class PlacedBeam:
         return self.system.AddMarker(marker)
 
     def coordinate_marker(self, node: int, coordinate: int) -> int:
-        """Marker on coordinate x (0), y (1), or rotation for small angles of a vertical beam (2)."""
+        """Marker on coordinate x (0), y (1), or, small and of an upright beam, rotation (2)."""
         marker = item.MarkerNodeCoordinate(nodeNumber=self.nodes[node], coordinate=coordinate)
         return self.system.AddMarker(marker)
 

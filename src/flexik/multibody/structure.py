@@ -1,6 +1,7 @@
 """Beams as data: section tables, masses, and their reduction to finite elements (NumPy only)."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,10 @@ SECTION_COLUMNS = ("x_m", "Iz_m4", "A_m2")
 MERGE_DISTANCE = 0.03
 
 # Gauss-Legendre points and weights on [0, 1], a panel between two rows of a section table
-_GAUSS_X, _GAUSS_W = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2
+_GAUSS_X, _GAUSS_W = (
+    (np.polynomial.legendre.leggauss(4)[0] + 1) / 2,
+    np.polynomial.legendre.leggauss(4)[1] / 2,
+)
 
 
 @dataclass(frozen=True)
@@ -61,11 +65,12 @@ class Beam:
 
 @dataclass(frozen=True)
 class Elements:
-    """Finite elements of a beam: stations (m + 1,) in m and, per element (m,):
+    """Finite elements of a beam: stations (m + 1,) in m, and arrays (m,) over the elements.
 
     bending_stiffness : L / int dx/EI, N m2.
     axial_stiffness : L / int dx/EA, N.
-    residual_flexibility : int (x - middle)^2 dx/EI, in m/N: what an element of constant curvature lacks.
+    residual_flexibility : int (x - middle)^2 dx/EI, m/N: what an element of constant curvature
+        lacks.
     node_mass : (m + 1,), kg, statically equivalent to the distributed mass.
     """
 
@@ -109,7 +114,7 @@ def discretise(beam: Beam, pins: tuple[float, ...], refinement: int = 1) -> Elem
     stations.sort()
     longest = (beam.span[1] - beam.span[0]) / (beam.n_elements * refinement)
     mesh = [stations[0]]
-    for start, end in zip(stations[:-1], stations[1:], strict=True):
+    for start, end in pairwise(stations):
         n = max(1, int(np.ceil((end - start) / longest - 1e-6)))
         mesh += list(np.linspace(start, end, n + 1)[1:])
     return _reduce(beam, np.array(mesh))
@@ -122,9 +127,9 @@ def _reduce(beam: Beam, stations: Array) -> Elements:
     length = np.diff(stations)
     flexibility = 1.0 / (beam.youngs_modulus * beam.section.second_moment_at(x))
     middle = (stations[:-1] + stations[1:]) / 2
-    bending = np.bincount(element, w * flexibility, n)
-    axial = np.bincount(element, w / (beam.youngs_modulus * beam.section.area_at(x)), n)
-    residual = np.bincount(element, w * flexibility * (x - middle[element]) ** 2, n)
+    bending = _sums(element, w * flexibility, n)
+    axial = _sums(element, w / (beam.youngs_modulus * beam.section.area_at(x)), n)
+    residual = _sums(element, w * flexibility * (x - middle[element]) ** 2, n)
 
     weight = w * _relative_density(beam, x)
     moments = np.array([np.sum(weight), np.sum(weight * x), np.sum(weight * x**2)])
@@ -133,9 +138,13 @@ def _reduce(beam: Beam, stations: Array) -> Elements:
     )
     slice_mass = weight * (factor[0] + factor[1] * x)
     along = (x - stations[element]) / length[element]
-    node_mass = np.bincount(element, slice_mass * (1 - along), n + 1)
-    node_mass += np.bincount(element + 1, slice_mass * along, n + 1)
+    node_mass = _sums(element, slice_mass * (1 - along), n + 1)
+    node_mass += _sums(element + 1, slice_mass * along, n + 1)
     return Elements(stations, length / bending, length / axial, residual, node_mass)
+
+
+def _sums(group: NDArray[np.int64], values: Array, n_groups: int) -> Array:
+    return np.bincount(group, values, n_groups).astype(np.float64)
 
 
 def _relative_density(beam: Beam, x: Array) -> Array:

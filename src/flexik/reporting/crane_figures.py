@@ -240,7 +240,7 @@ def _figure_sequences(grid: pd.DataFrame) -> Figure:
 
 def _sequence(whole: Axes, detail: Axes, values: Array, colour: str) -> None:
     number = np.arange(1, len(values) + 1)
-    whole.plot(number, values, ".", color=colour, markersize=1.5, rasterized=True)
+    whole.plot(number, values, ".", color=colour, markersize=1.5)
     detail.plot(number[:DETAIL], values[:DETAIL], ".-", color=colour, markersize=3, linewidth=0.8)
     whole.set(ylim=(-1.12, 1.12), yticks=(-1, 0, 1), xlim=(-0.01 * len(values), 1.01 * len(values)))
     style.true_minus(whole)

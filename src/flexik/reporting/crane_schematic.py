@@ -36,7 +36,7 @@ COLOUR = {
 PINS = {
     "C": ("lift_cylinder_base", "pillar", (14.0, -5.0)),
     "B": ("lift_pivot", "pillar", (-13.0, 8.0)),
-    "D": ("lift_cylinder_head", "lift", (5.0, -15.0)),
+    "D": ("lift_cylinder_head", "lift", (16.0, -10.0)),
     "E": ("jib_cylinder_base", "lift", (-3.0, 15.0)),
     "F": ("rocker_pivot", "lift", (-12.0, -14.0)),
     "G": ("jib_pivot", "lift", (8.0, -16.0)),
@@ -103,7 +103,8 @@ def _figure_crane(geometry: CraneGeometry, shape: Mapping[str, Any]) -> Figure:
     rigid_pins = _rigid_pins(geometry, strokes)
     pins = _carry_pins(rigid_pins, reference, bent)
 
-    extent = _extent([*reference.values(), *bent.values(), *rigid_pins.values()])
+    weight = bent["extension"][-1] - [0.0, 0.35]
+    extent = _extent([*reference.values(), *bent.values(), *rigid_pins.values(), weight])
     size = extent[1] - extent[0]
     height = float(np.clip((style.WIDTH - 0.7) * size[1] / size[0] + 1.1, 3.5, 9.0))
     figure = Figure(figsize=(style.WIDTH, height))
@@ -117,8 +118,9 @@ def _figure_crane(geometry: CraneGeometry, shape: Mapping[str, Any]) -> Figure:
     _draw_cylinders(axes, geometry, pins)
     _draw_beams(axes, bent, pins)
     _draw_pads(axes, bent)
-    _label_pins(axes, pins, float(pose(geometry, strokes).lift_angle[0]))
-    _label_links(axes, bent, pins, strokes)
+    lift_angle = float(pose(geometry, strokes).lift_angle[0])
+    _label_pins(axes, pins, lift_angle)
+    _label_links(axes, bent, pins, strokes, lift_angle)
     _draw_tip(axes, reference["extension"][-1], bent["extension"][-1], float(shape["payload"]))
     axes.set_title(_title(shape))
     return figure
@@ -269,30 +271,32 @@ def _draw_tip(axes: Axes, rigid: Array, bent: Array, payload: float) -> None:
 
 def _label_pins(axes: Axes, pins: Points, lift_angle: float) -> None:
     offsets = {letter: offset for letter, (_, _, offset) in PINS.items()} | dict([HEAD])
-    c, s = np.cos(lift_angle), np.sin(lift_angle)
-    for letter, (along, left) in offsets.items():
+    for letter, offset in offsets.items():
         axes.add_patch(
             Circle(tuple(pins[letter]), 0.036, facecolor="white", edgecolor=style.INK, zorder=6)
         )
-        turned = (c * along - s * left, s * along + c * left)
-        _text(
-            axes, letter, pins[letter], (along, left) if letter in "BC" else turned, "center", 10.5
-        )
+        offset = offset if letter in "BC" else _turned(lift_angle, offset)
+        _text(axes, letter, pins[letter], offset, "center", 10.5)
 
 
-def _label_links(axes: Axes, bent: Points, pins: Points, strokes: Array) -> None:
+def _turned(angle: float, offset: tuple[float, float]) -> tuple[float, float]:
+    c, s = np.cos(angle), np.sin(angle)
+    return (c * offset[0] - s * offset[1], s * offset[0] + c * offset[1])
+
+
+def _label_links(axes: Axes, bent: Points, pins: Points, strokes: Array, lift_angle: float) -> None:
+    over_lift = _turned(lift_angle, (-24.0, 44.0))
     lift, jib, extension = (f"{MM * s:.0f} mm" for s in strokes)
-    middle = {name: bent[name][len(bent[name]) // 2] for name in BEAMS}
     outer = (bent["jib"][-1] + bent["extension"][-1]) / 2
     labels = [
-        ("pillar", middle["pillar"], (-40.0, 0.0), "right"),
+        ("pillar", bent["pillar"][[0, -1]].mean(axis=0), (-40.0, 0.0), "right"),
         ("ground spring", bent["pillar"][0], (50.0, 0.0), "left"),
-        ("lift arm", middle["lift"], (12.0, -30.0), "left"),
+        ("lift arm", 0.4 * pins["B"] + 0.6 * pins["G"], (12.0, -30.0), "left"),
         (f"lift cylinder\nstroke {lift}", (pins["C"] + pins["D"]) / 2, (28.0, -8.0), "left"),
-        (f"jib cylinder\nstroke {jib}", 0.6 * pins["E"] + 0.4 * pins["H"], (-30.0, 30.0), "right"),
+        (f"jib cylinder\nstroke {jib}", 0.6 * pins["E"] + 0.4 * pins["H"], over_lift, "right"),
         ("rocker", (pins["F"] + pins["H"]) / 2, (-40.0, 45.0), "right"),
         ("coupler", (pins["H"] + pins["I"]) / 2, (34.0, 34.0), "left"),
-        ("jib", bent["jib"][len(bent["jib"]) // 2], (-28.0, -34.0), "right"),
+        ("jib", (bent["extension"][0] + bent["jib"][-1]) / 2, (-28.0, -34.0), "right"),
         ("rear pad", bent["extension"][0], (4.0, 46.0), "center"),
         ("front pad", bent["jib"][-1], (20.0, 34.0), "left"),
         (f"extension\nstroke {extension}", outer, (-20.0, -44.0), "right"),

@@ -1,6 +1,7 @@
 """One look for all figures, and PNG files whose bytes depend on the data alone."""
 
-from collections.abc import Callable, Iterable, Mapping
+import contextlib
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -51,14 +52,21 @@ STYLE: dict[Any, Any] = {
 }
 
 
-def write_png(path: Path | str, build: Callable[..., Figure], *data: Any) -> None:
-    """Write the figure `build(*data)` to `path` in the house style, whole or not at all.
-
-    A user's own matplotlib settings have no say, and the file carries no version or date.
-    """
+@contextlib.contextmanager
+def house_style() -> Iterator[None]:
+    """Set STYLE over matplotlib's own defaults; a user's settings have no say and come back."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(STYLE)
+        yield
+
+
+def write_png(path: Path | str, build: Callable[..., Figure], *data: Any) -> None:
+    """Write the figure `build(*data)` to `path` in the house style, whole or not at all.
+
+    The file carries no version of matplotlib and no date.
+    """
+    with house_style():
         figure = build(*data)
         with atomic_path(path) as temporary:
             FigureCanvasAgg(figure).print_png(str(temporary), metadata={"Software": None})
@@ -84,8 +92,8 @@ def true_minus(axes: Axes) -> None:
 
 
 def signed(value: float) -> str:
-    """Shortest decimal form with a real minus sign."""
-    return f"{value:g}".replace("-", "\N{MINUS SIGN}")
+    """Shortest decimal form with a real minus sign; zero has none."""
+    return f"{value + 0.0:g}".replace("-", "\N{MINUS SIGN}")
 
 
 def coordinates(x: float, y: float) -> str:

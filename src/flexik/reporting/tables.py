@@ -163,7 +163,7 @@ def mesh_table(frame: pd.DataFrame) -> pd.DataFrame:
     ----------
     frame
         A row for every mesh; columns `refinement`, `mean_difference` and `max_difference` (m, of
-        the tip from the finest mesh). Other columns pass through unchanged, in front.
+        the tip from the finest mesh). Other columns pass through unchanged.
 
     Raises
     ------
@@ -171,14 +171,12 @@ def mesh_table(frame: pd.DataFrame) -> pd.DataFrame:
         If a column is missing.
     """
     names = {
-        "refinement": "refinement",
         "mean_difference": "mean tip difference (mm)",
         "max_difference": "max tip difference (mm)",
     }
-    require("mesh study", frame.columns, names)
-    others = [name for name in frame.columns if name not in names]
-    table = frame[[*others, *names]].copy()
-    for name in ("mean_difference", "max_difference"):
+    require("mesh study", frame.columns, ("refinement", *names))
+    table = frame.copy()
+    for name in names:
         table[name] = MM * table[name]
     return table.rename(columns=names).reset_index(drop=True)
 
