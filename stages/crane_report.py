@@ -109,9 +109,9 @@ def write_tables(
         f"Tip against the mesh of refinement {study['refinement'].max()} with "
         f"{crane.structure.element} elements, {crane.mesh_study.n_samples} random samples."
     )
-    tables.write_table(
-        REPORTS / "mesh_study", tables.mesh_table(study).assign(**shares), 3, caption
-    )
+    study = tables.mesh_table(study).assign(**shares)
+    decimals = {name: 2 if name in shares else 3 for name in study}
+    tables.write_table(REPORTS / "mesh_study", study, decimals, caption)
 
     columns = [field.name for field in CONDITION_FIELDS]
     every = pd.concat([frame[columns].assign(method=label) for label, frame in frames.items()])

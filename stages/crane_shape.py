@@ -30,13 +30,17 @@ def main() -> None:
             "strokes": strokes,
             "payload": payload,
             "exaggeration": crane.illustration.exaggeration,
-            "beams": {name: nodes.tolist() for name, nodes in solved.shapes.items()},
-            "reference": {n: x.tolist() for n, x in reference_shapes(model, strokes).items()},
-            "tip": solved.tip.tolist(),
-            "rigid_tip": forward(model.geometry, np.array([strokes]))[0].tolist(),
-            "forces": solved.forces,
+            "beams": {name: rounded(nodes) for name, nodes in solved.shapes.items()},
+            "reference": {n: rounded(x) for n, x in reference_shapes(model, strokes).items()},
+            "tip": rounded(solved.tip),
+            "rigid_tip": rounded(forward(model.geometry, np.array([strokes]))[0]),
         },
     )
+
+
+def rounded(values: np.ndarray) -> list[float]:
+    """Values to 1 um, below which machines differ."""
+    return np.round(values, 6).tolist()
 
 
 if __name__ == "__main__":

@@ -54,4 +54,6 @@ def fit_spring(
         )
     # a compliance, so nearly linear in 1/k; brentq needs about eight evaluations
     stiffness = float(np.exp(brentq(excess, low, high, xtol=1e-9)))
+    # six digits: what depends on the machine lies below
+    stiffness = float(f"{stiffness:.6g}")
     return Calibration(stiffness, uncompensated(stiffness))
