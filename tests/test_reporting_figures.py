@@ -76,6 +76,7 @@ def shape(geometry):
     return {
         "strokes": strokes.tolist(),
         "payload": 470.0,
+        "exaggeration": 5.0,
         "beams": {name: nodes.tolist() for name, nodes in beams.items()},
         "reference": {name: nodes.tolist() for name, nodes in reference.items()},
         "tip": beams["extension"][-1].tolist(),

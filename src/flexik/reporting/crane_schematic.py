@@ -19,9 +19,8 @@ from flexik.reporting.style import MM
 Array = NDArray[np.float64]
 Points = dict[str, Array]
 
-EXAGGERATION = 5.0
 BEAMS = ("pillar", "lift", "jib", "extension")
-SHAPE_KEYS = ("strokes", "payload", "beams", "reference", "tip", "rigid_tip")
+SHAPE_KEYS = ("strokes", "payload", "exaggeration", "beams", "reference", "tip", "rigid_tip")
 
 # Half of the depth drawn, m; the sections are known by their stiffness, not by their outline
 HALF_DEPTH = {"pillar": 0.085, "lift": 0.095, "jib": 0.085, "extension": 0.055}
@@ -46,7 +45,7 @@ HEAD = ("H", (-3.0, 16.0))
 
 
 def crane(path: Path | str, geometry: CraneGeometry, shape: Mapping[str, Any]) -> None:
-    """Draw the loaded crane, deflection EXAGGERATION times larger, over its rigid pose.
+    """Draw the loaded crane, deflection enlarged, over its rigid pose.
 
     Parameters
     ----------
@@ -55,8 +54,9 @@ def crane(path: Path | str, geometry: CraneGeometry, shape: Mapping[str, Any]) -
     geometry
         Rigid dimensions, m.
     shape
-        `strokes` (3,) in m; `payload` in kg; `beams` and `reference`: for each of BEAMS the node
-        positions (k, 2) in m, in equilibrium and rigid; `tip` and `rigid_tip` (2,) in m.
+        `strokes` (3,) in m; `payload` in kg; `exaggeration` of the deflection; `beams` and
+        `reference`: for each of BEAMS the node positions (k, 2) in m, in equilibrium and rigid;
+        `tip` and `rigid_tip` (2,) in m.
 
     Raises
     ------
@@ -92,12 +92,12 @@ def _figure_crane(geometry: CraneGeometry, shape: Mapping[str, Any]) -> Figure:
     for key in ("beams", "reference"):
         style.require(f"crane shape, {key}", shape[key], BEAMS)
         style.finite(f"crane shape, {key}", {beam: shape[key][beam] for beam in BEAMS})
-    numbers = ("strokes", "payload", "tip", "rigid_tip")
+    numbers = ("strokes", "payload", "exaggeration", "tip", "rigid_tip")
     style.finite("crane shape", {key: shape[key] for key in numbers})
     reference = {name: np.asarray(shape["reference"][name], dtype=float) for name in BEAMS}
     bent = {
-        name: reference[name] + EXAGGERATION * (np.asarray(shape["beams"][name]) - reference[name])
-        for name in BEAMS
+        name: nodes + float(shape["exaggeration"]) * (np.asarray(shape["beams"][name]) - nodes)
+        for name, nodes in reference.items()
     }
     strokes = np.asarray(shape["strokes"], dtype=float)
     rigid_pins = _rigid_pins(geometry, strokes)
@@ -133,7 +133,7 @@ def _title(shape: Mapping[str, Any]) -> str:
     return (
         f"Log crane with {shape['payload']:g} kg at its tip, in static equilibrium\n"
         f"Tip deflection {np.hypot(x, y):.1f} mm ({sideways}, {vertical}); "
-        f"drawn {EXAGGERATION:g} times larger; grey: rigid"
+        f"drawn {shape['exaggeration']:g} times larger; grey: rigid"
     )
 
 
