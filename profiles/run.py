@@ -40,7 +40,11 @@ def run(profile: Path, folder: Path) -> None:
     write_text(folder / PARAMETERS_FILE, yaml.safe_dump(values, sort_keys=False))
     # the stages' `python` is the one that runs this file
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    environment = os.environ | {"PATH": path, "DVC_NO_ANALYTICS": "1"}
+    environment = os.environ | {
+        "PATH": path,
+        "PYTHONPATH": str(folder.resolve() / "src"),  # the copy runs its own code
+        "DVC_NO_ANALYTICS": "1",
+    }
     done = subprocess.run(["dvc", "repro"], cwd=folder, env=environment, check=False)
     if done.returncode:
         raise FlexikError(f"profile {profile}: the pipeline failed in {folder}")

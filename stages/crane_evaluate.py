@@ -1,8 +1,9 @@
 """Command the crane by one method under all test conditions and record the errors.
 
 Usage: crane_evaluate.py METHOD, a name under crane.methods, or none.
-Reads params.yaml: crane.geometry, crane.structure, crane.evaluation, crane.methods.METHOD and,
-where its inverse is genetic, crane.genetic; data/crane/calibration.json; the method's network.
+Reads params.yaml: crane.geometry, crane.structure, crane.evaluation, crane.methods.METHOD (and
+crane.grid, crane.selection, crane.networks to know which network belongs to them);
+data/crane/calibration.json; the method's network.
 Writes data/crane/evaluations/METHOD.parquet.
 """
 
@@ -65,12 +66,11 @@ def chosen_method(
         FOLDER / "networks" / f"{chosen.network}.json",
         network_checksum(crane, stiffness, chosen.network),
     )
-    inverses: dict[str, RigidInverse] = {
-        "closed_form": closed_form(geometry),
-        "genetic": genetic(geometry, GeneticSettings(**crane.genetic.model_dump())),
-    }
+    inverse: RigidInverse = closed_form(geometry)
+    if chosen.genetic is not None:
+        inverse = genetic(geometry, GeneticSettings(**chosen.genetic.model_dump()))
     networks: dict[str, Network] = {crane.networks[chosen.network].kind: network}
-    ingredients = Ingredients(geometry, inverses[chosen.inverse], networks)
+    ingredients = Ingredients(geometry, inverse, networks)
     return build_method(chosen.method, ingredients, n_corrections=chosen.n_corrections)
 
 

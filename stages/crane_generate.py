@@ -53,6 +53,7 @@ def main() -> None:
         ("selection", split(selection), selection_checksum(crane, stiffness)),
     ):
         path = FOLDER / f"{name}.parquet"
+        path.with_suffix(".failed.parquet").unlink(missing_ok=True)
         reused = generate(
             path,
             model,

@@ -1,7 +1,8 @@
 """Train one network of the crane from several starts; the selection set chooses among them.
 
 Usage: crane_train.py NETWORK, a name under crane.networks.
-Reads params.yaml: parallel, crane.networks.NETWORK; the tables of crane_generate.
+Reads params.yaml: parallel, crane.networks.NETWORK (and crane.geometry, crane.structure,
+crane.grid, crane.selection to know which data belong to them); the tables of crane_generate.
 Writes data/crane/networks/NETWORK.json and the training records NETWORK_training.csv.
 """
 

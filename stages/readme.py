@@ -8,7 +8,7 @@ from pathlib import Path
 from flexik import stage
 from flexik.errors import DataError
 from flexik.files import write_text
-from flexik.reporting.page import replace_block
+from flexik.reporting.blocks import replace_block
 
 README = Path("README.md")
 TABLE = Path("reports/crane/positioning_errors.md")

@@ -225,7 +225,7 @@ def test_every_parameter_of_a_stage_exists(name):
 
 
 # What a script mentions for other methods than that of the stage
-OTHER_METHODS = {"crane_evaluate_none": {"methods", "networks", "genetic"}}
+OTHER_METHODS = {"crane_evaluate_none": {"methods", "networks"}}
 
 
 @each_stage

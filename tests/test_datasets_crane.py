@@ -234,7 +234,7 @@ COVERED = {
     "evaluation.payloads.0": {NONE, COMBINED, GA},
     "methods.combined.n_corrections": {COMBINED},
     "methods.combined_ga.n_corrections": {GA},
-    "genetic.seed": {GA},
+    "methods.combined_ga.genetic.seed": {GA},
     "calibration.published_mean_error": set(),
     "mesh_study.seed": set(),
     "illustration.payload": set(),

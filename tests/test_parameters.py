@@ -98,9 +98,9 @@ WRONG = [
     (f"{DEFLECTION}.trainer.mu_decrease", 1.0),
     (f"{DEFLECTION}.trainer.mu_increase", 1.0),
     ("crane.methods.combined.n_corrections", 0),
-    ("crane.genetic.n_individuals", 1),
-    ("crane.genetic.n_current", 16),
-    ("crane.genetic.tolerance", 0.0),
+    ("crane.methods.combined_ga.genetic.n_individuals", 1),
+    ("crane.methods.combined_ga.genetic.n_current", 16),
+    ("crane.methods.combined_ga.genetic.tolerance", 0.0),
     ("parallel.n_workers", -1),
     # names that nothing goes by
     ("crane.structure.element", "timoshenko"),
@@ -140,7 +140,7 @@ WRONG = [
     ("crane.structure.gravity", ...),
     ("crane.structure.beams.pillar", ...),
     (f"{DEFLECTION}.trainer.goal", ...),
-    ("crane.genetic", ...),
+    ("crane.methods.combined_ga.genetic", ...),
     ("parallel", ...),
 ]
 
@@ -161,9 +161,9 @@ def test_a_mistake_names_its_key(original, key, value):
 
 def test_several_mistakes_are_told_at_once(original):
     data = changed(original, "crane.structure.gravity", -1.0)
-    text = mistake(changed(data, "crane.genetic.tolerance", ...))
+    text = mistake(changed(data, "crane.methods.combined_ga.genetic.tolerance", ...))
     assert [line.split(": ")[1] for line in text.splitlines()] == [
-        *("crane.structure.gravity", "crane.genetic.tolerance")
+        *("crane.structure.gravity", "crane.methods.combined_ga.genetic.tolerance")
     ]
 
 

@@ -6,7 +6,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from flexik.errors import DataError
-from flexik.reporting.page import Section, page, replace_block
+from flexik.reporting.blocks import replace_block
+from flexik.reporting.page import Section, page
 from flexik.reporting.tables import write_table
 
 TEXT = st.text(st.characters(codec="utf-8", exclude_characters="\r"))

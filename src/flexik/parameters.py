@@ -5,7 +5,7 @@ where DVC watches it. The names `size` and `nfiles` are never used: DVC's run ca
 """
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -40,7 +40,7 @@ class Model(BaseModel):
         # YAML 1.1 reads 1e-5 as text, which pydantic would turn into a number behind one's back
         if isinstance(data, dict):
             for key, value in data.items():
-                for entry in value if isinstance(value, list) else [value]:
+                for entry in _entries(value):
                     if isinstance(entry, bool) or (isinstance(entry, str) and _is_number(entry)):
                         raise ValueError(
                             f"{key}: {entry!r} is no YAML number (write 1.0e-5, 1.0e+6)"
@@ -231,15 +231,6 @@ class Evaluation(Model):
     payloads: Annotated[list[NotNegative], Field(min_length=1)]
 
 
-class MethodModel(Model):
-    """A positioning method and what it is built from."""
-
-    method: Literal["combined"]
-    network: Name
-    inverse: Literal["closed_form", "genetic"]
-    n_corrections: Count
-
-
 class Genetic(Model):
     """Genetic rigid inverse, see positioning.genetic."""
 
@@ -256,6 +247,22 @@ class Genetic(Model):
         return self
 
 
+class MethodModel(Model):
+    """A positioning method and what it is built from."""
+
+    method: Literal["combined"]
+    network: Name
+    inverse: Literal["closed_form", "genetic"]
+    genetic: Genetic | None
+    n_corrections: Count
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if (self.inverse == "genetic") != (self.genetic is not None):
+            raise ValueError("genetic: settings where inverse is genetic, null where it is not")
+        return self
+
+
 class Crane(Model):
     """The log crane."""
 
@@ -269,7 +276,6 @@ class Crane(Model):
     networks: Annotated[dict[Name, NetworkModel], Field(min_length=1)]
     evaluation: Evaluation
     methods: dict[Name, MethodModel]
-    genetic: Genetic
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -316,6 +322,8 @@ def read_yaml(path: Path | str) -> dict[str, Any]:
         text = Path(path).read_text(encoding="utf-8")
     except OSError as error:
         raise ParameterError(f"{path}: cannot be read ({error.strerror})") from None
+    except UnicodeDecodeError as error:
+        raise ParameterError(f"{path}: expected text in UTF-8 ({error.reason})") from None
     try:
         data = yaml.load(text, Loader=_UniqueKeyLoader)
     except yaml.YAMLError as error:
@@ -378,6 +386,15 @@ def _unique_mapping(loader: _UniqueKeyLoader, node: yaml.MappingNode) -> dict[An
 
 
 _UniqueKeyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _unique_mapping)
+
+
+def _entries(value: Any) -> Iterator[Any]:
+    """`value`, or the entries of lists however deep."""
+    if isinstance(value, list):
+        for entry in value:
+            yield from _entries(entry)
+    else:
+        yield value
 
 
 def _is_number(text: str) -> bool:

@@ -36,6 +36,4 @@ def evaluation_checksum(crane: parameters.Crane, spring_stiffness: float, label:
             parameters_checksum([method]),
             network_checksum(crane, spring_stiffness, method.network),
         ]
-        if method.inverse == "genetic":
-            parts.append(parameters_checksum([crane.genetic]))
     return checksum(*parts)
