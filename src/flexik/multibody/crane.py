@@ -366,7 +366,7 @@ def _settings() -> exu.SimulationSettings:
     settings.staticSolver.newton.relativeTolerance = 0.0
     settings.staticSolver.minimumStepSize = SMALLEST_LOAD_STEP
     # weights hardly stiffen the crane, and its Jacobian hardly changes: both only cost time
-    settings.staticSolver.computeLoadsJacobian = 0
+    settings.staticSolver.computeLoadsJacobian = False
     settings.staticSolver.newton.useModifiedNewton = True
     return settings
 
