@@ -69,7 +69,9 @@ def chosen_method(
     inverse: RigidInverse = closed_form(geometry)
     if chosen.genetic is not None:
         inverse = genetic(geometry, GeneticSettings(**chosen.genetic.model_dump()))
-    networks: dict[str, Network] = {crane.networks[chosen.network].kind: network}
+    learnt = crane.any_network(chosen.network)
+    assert learnt is not None  # validated with the parameters
+    networks: dict[str, Network] = {learnt.kind: network}
     ingredients = Ingredients(geometry, inverse, networks)
     return build_method(chosen.method, ingredients, n_corrections=chosen.n_corrections)
 

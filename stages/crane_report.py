@@ -1,8 +1,9 @@
 """Tables, figures, metrics and the report page of the crane.
 
 Reads params.yaml: crane; what the other crane stages wrote; the published table.
-Writes reports/crane/: positioning_errors, calibration, mesh_study and training (CSV and Markdown),
-errors.csv with every condition of every method, metrics.json, figures/ and README.md.
+Writes reports/crane/: positioning_errors, calibration, mesh_study, training and size_selection/
+(CSV and Markdown), errors.csv with every condition of every method, metrics.json, figures/ and
+README.md.
 """
 
 from pathlib import Path
@@ -12,10 +13,17 @@ import pandas as pd
 from flexik import stage
 from flexik.datasets.crane import FIELDS
 from flexik.datasets.evaluations import read_evaluation
-from flexik.datasets.provenance import evaluation_checksum, grid_checksum, selection_checksum
+from flexik.datasets.provenance import (
+    evaluation_checksum,
+    grid_checksum,
+    network_checksum,
+    selection_checksum,
+)
 from flexik.datasets.tables import read_table
 from flexik.errors import DataError
 from flexik.files import read_json
+from flexik.learning.size_selection import FIELDS as STUDY_FIELDS
+from flexik.learning.size_selection import by_size
 from flexik.parameters import load_parameters
 from flexik.reporting.crane_report import Results, write_report
 
@@ -34,9 +42,14 @@ def main() -> None:
         )
         for label in ("none", *crane.methods)
     }
-    training = {
-        name: read_csv(DATA / "networks" / f"{name}_training.csv") for name in crane.networks
-    }
+    names = [*crane.networks, *crane.selected_networks]
+    training = {name: read_csv(DATA / "networks" / f"{name}_training.csv") for name in names}
+    studies = {}
+    for name in crane.selected_networks:
+        made_with = network_checksum(crane, stiffness, name)
+        runs = read_table(DATA / "size_selection" / f"{name}.parquet", STUDY_FIELDS, made_with)
+        chosen = read_json(DATA / "size_selection" / f"{name}.json")["n_hidden"]
+        studies[name] = by_size(runs), chosen
     selection_made = selection_checksum(crane, stiffness)
     results = Results(
         crane=crane,
@@ -47,6 +60,7 @@ def main() -> None:
         published=read_csv(PUBLISHED),
         mesh_study=read_csv(DATA / "mesh_study.csv"),
         training=pd.concat(training, names=["network"]).reset_index(level="network"),
+        studies=studies,
         shape=read_json(DATA / "shape.json"),
     )
     write_report(results, REPORTS, PUBLISHED)

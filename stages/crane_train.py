@@ -1,8 +1,9 @@
 """Train one network of the crane from several starts; the selection set chooses among them.
 
-Usage: crane_train.py NETWORK, a name under crane.networks.
-Reads params.yaml: parallel, crane.networks.NETWORK (and crane.geometry, crane.structure,
-crane.grid, crane.selection to know which data belong to them); the tables of crane_generate.
+Usage: crane_train.py NETWORK, a name under crane.networks or crane.selected_networks.
+Reads params.yaml: parallel, crane.networks.NETWORK or crane.selected_networks.NETWORK (and
+crane.geometry, crane.structure, crane.grid, crane.selection to know which data belong to it); the
+tables of crane_generate; for a selected network the choice of crane_select.
 Writes data/crane/networks/NETWORK.json and the training records NETWORK_training.csv.
 """
 
@@ -13,73 +14,73 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from flexik import stage
-from flexik.datasets.crane import FIELDS, INPUTS, deflection, kept
+from flexik import parameters, stage
+from flexik.datasets.crane_learning import INPUT_FIELDS, KINDS, read_learning_data
 from flexik.datasets.parallel import ParallelSettings, from_environment, parallel_map
-from flexik.datasets.provenance import grid_checksum, network_checksum, selection_checksum
-from flexik.datasets.tables import read_table
+from flexik.datasets.provenance import network_checksum
 from flexik.errors import ParameterError
 from flexik.files import read_json, write_text
-from flexik.learning.perceptron import Quantity
+from flexik.learning.perceptron import quantities
 from flexik.learning.storage import save_network
-from flexik.learning.training import Architecture, LevenbergMarquardt, TrainingRecord, train_best
+from flexik.learning.training import Architecture, TrainingRecord, train_best, trainer_settings
 from flexik.parameters import load_parameters
 
-FOLDER = Path("data/crane")
-INPUT_QUANTITIES = [Quantity(f.name, f.unit) for f in FIELDS if f.name in INPUTS]
-
-# What each kind of network learns from the inputs: outputs, and their values from a table
-KINDS = {
-    "deflection": ([Quantity("deflection_x", "m"), Quantity("deflection_y", "m")], deflection),
-}
+DATA = Path("data/crane")
 
 
 def main() -> None:
     """Run the stage."""
-    parameters = load_parameters()
-    crane = parameters.crane
-    name = sys.argv[1]
-    if name not in crane.networks:
-        raise ParameterError(f"crane.networks: there is no {name!r} ({', '.join(crane.networks)})")
-    network = crane.networks[name]
-    stiffness = read_json(FOLDER / "calibration.json")["spring_stiffness"]
-    grid = kept(read_table(FOLDER / "grid.parquet", FIELDS, grid_checksum(crane, stiffness)))
-    selection = kept(
-        read_table(FOLDER / "selection.parquet", FIELDS, selection_checksum(crane, stiffness))
-    )
-    outputs, values = KINDS[network.kind]
-    settings = from_environment(ParallelSettings(**parameters.parallel.model_dump()))
+    given = load_parameters()
+    crane, name = given.crane, sys.argv[1]
+    network = crane.any_network(name)
+    if network is None:
+        known = ", ".join([*crane.networks, *crane.selected_networks])
+        raise ParameterError(f"crane.networks: there is no {name!r} ({known})")
+    stiffness = read_json(DATA / "calibration.json")["spring_stiffness"]
+    data = read_learning_data(DATA, crane, stiffness, network.kind)
+    trainer = network.trainer.model_dump()
+    settings = from_environment(ParallelSettings(**given.parallel.model_dump()))
     best, record, records = train_best(
-        grid[list(INPUTS)].to_numpy(),
-        values(grid),
-        selection[list(INPUTS)].to_numpy(),
-        values(selection),
-        Architecture(network.n_hidden, network.activation),
-        LevenbergMarquardt(**network.trainer.model_dump()),
+        data.inputs,
+        data.outputs,
+        data.selection_inputs,
+        data.selection_outputs,
+        Architecture(size_of(network, name), network.activation),
+        trainer_settings(trainer.pop("kind"), trainer),
         network.seed,
         network.n_restarts,
-        INPUT_QUANTITIES,
-        outputs,
+        quantities(INPUT_FIELDS),
+        quantities(KINDS[network.kind].outputs),
         functools.partial(parallel_map, settings=settings, description=f"train {name}"),
     )
-    folder = FOLDER / "networks"
+    folder = DATA / "networks"
     save_network(folder / f"{name}.json", best, record, network_checksum(crane, stiffness, name))
-    write_text(folder / f"{name}_training.csv", summary(records).to_csv(index=False))
+    write_text(folder / f"{name}_training.csv", summary(records, best.n_hidden))
     print(f"{name}: restart {record.restart}, selection error {record.selection_error:.3g}")
 
 
-def summary(records: list[TrainingRecord]) -> pd.DataFrame:
-    """One row a restart: errors are root mean squares of normalised outputs."""
-    return pd.DataFrame(
+def size_of(network: parameters.NetworkModel | parameters.SelectedNetwork, name: str) -> int:
+    """Number of hidden neurons, given or chosen."""
+    if isinstance(network, parameters.NetworkModel):
+        return network.n_hidden
+    return int(read_json(DATA / "size_selection" / f"{name}.json")["n_hidden"])
+
+
+def summary(records: list[TrainingRecord], n_hidden: int | tuple[int, ...]) -> str:
+    """CSV, a row a restart; errors are root mean squares of normalised outputs."""
+    rows = [
         {
             "restart": record.restart,
+            "n_hidden": n_hidden,
+            "trainer": record.trainer,
             "n_iterations": len(record.errors) - 1,
-            "training_error": np.sqrt(record.errors[-1]) if record.errors else np.nan,
+            "training_error": np.sqrt(record.errors[record.kept]) if record.errors else np.nan,
             "selection_error": record.selection_error,
             "stop_reason": record.stop_reason,
         }
         for record in records
-    )
+    ]
+    return pd.DataFrame(rows).to_csv(index=False)
 
 
 if __name__ == "__main__":

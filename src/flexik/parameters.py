@@ -199,18 +199,71 @@ class Selection(Model):
         return self
 
 
-class Trainer(Model):
-    """Levenberg-Marquardt, see learning.levenberg_marquardt."""
+class Stopping(Model):
+    """When any trainer stops, see learning.stopping."""
 
     n_iterations: Count
-    mu: Positive
-    mu_decrease: Annotated[float, Field(gt=0, lt=1)]
-    mu_increase: Annotated[float, Field(gt=1)]
-    mu_maximum: Positive
     goal: NotNegative
     minimum_gradient: NotNegative
     minimum_progress: Annotated[float, Field(ge=0, lt=1)]
     progress_window: Count
+    maximum_seconds: Positive | None
+    selection_patience: Count | None
+
+
+class LevenbergMarquardt(Stopping):
+    """The published schedule, see learning.levenberg_marquardt."""
+
+    kind: Literal["levenberg_marquardt"]
+    mu: Positive
+    mu_decrease: Annotated[float, Field(gt=0, lt=1)]
+    mu_increase: Annotated[float, Field(gt=1)]
+    mu_maximum: Positive
+
+
+class LevenbergMarquardtAccelerated(Stopping):
+    """See learning.accelerated."""
+
+    kind: Literal["levenberg_marquardt_accelerated"]
+    mu: Positive
+    mu_maximum: Positive
+    acceleration: NotNegative
+
+
+class BackPropagation(Stopping):
+    """See learning.back_propagation."""
+
+    kind: Literal["back_propagation"]
+    mode: Literal["pattern", "batch"]
+    learning_rate: Positive
+    momentum: Annotated[float, Field(ge=0, lt=1)]
+    rate_increase: Annotated[float, Field(ge=1)]
+    rate_decrease: Annotated[float, Field(gt=0, lt=1)]
+    error_increase: Annotated[float, Field(ge=1)]
+    minimum_rate: Positive
+
+
+class Adam(Stopping):
+    """See learning.adam."""
+
+    kind: Literal["adam"]
+    learning_rate: Positive
+    beta_1: Annotated[float, Field(ge=0, lt=1)]
+    beta_2: Annotated[float, Field(ge=0, lt=1)]
+    batch_size: Count | None
+
+
+class Lbfgs(Stopping):
+    """See learning.lbfgs."""
+
+    kind: Literal["lbfgs"]
+    memory: Count
+
+
+Trainer = Annotated[
+    LevenbergMarquardt | LevenbergMarquardtAccelerated | BackPropagation | Adam | Lbfgs,
+    Field(discriminator="kind"),
+]
 
 
 class NetworkModel(Model):
@@ -218,6 +271,34 @@ class NetworkModel(Model):
 
     kind: Literal["deflection"]
     n_hidden: Count
+    activation: Literal["tanh", "logistic"]
+    n_restarts: Count
+    seed: Seed
+    trainer: Trainer
+
+
+class Sizes(Axis):
+    """Numbers of hidden neurons."""
+
+    minimum: Count
+    maximum: Count
+    increment: Count
+
+
+class Select(Model):
+    """Study of sizes, see learning.size_selection."""
+
+    n_hidden: Sizes
+    n_restarts: Count
+    tolerance: NotNegative
+    trainer: Trainer
+
+
+class SelectedNetwork(Model):
+    """A network whose size the selection error chooses."""
+
+    kind: Literal["deflection"]
+    select: Select
     activation: Literal["tanh", "logistic"]
     n_restarts: Count
     seed: Seed
@@ -274,8 +355,13 @@ class Crane(Model):
     grid: Grid
     selection: Selection
     networks: Annotated[dict[Name, NetworkModel], Field(min_length=1)]
+    selected_networks: dict[Name, SelectedNetwork]
     evaluation: Evaluation
     methods: dict[Name, MethodModel]
+
+    def any_network(self, name: str) -> NetworkModel | SelectedNetwork | None:
+        """Network `name`, of given or of selected size; None if there is none."""
+        return self.networks.get(name) or self.selected_networks.get(name)
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -289,11 +375,14 @@ class Crane(Model):
         if "none" in self.methods:
             raise ValueError("methods.none: the name is taken by the uncompensated crane")
         for label, method in self.methods.items():
-            if method.network not in self.networks:
-                known = ", ".join(self.networks)
+            if self.any_network(method.network) is None:
+                known = ", ".join([*self.networks, *self.selected_networks])
                 raise ValueError(
                     f"methods.{label}.network: there is no network {method.network!r} ({known})"
                 )
+        for label in self.selected_networks:
+            if label in self.networks:
+                raise ValueError(f"selected_networks.{label}: there is such a name under networks")
         for number, target in enumerate(self.evaluation.points):
             if target in self.evaluation.points[:number]:
                 raise ValueError(f"evaluation.points.{number}: {target} is there twice")

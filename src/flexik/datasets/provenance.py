@@ -1,6 +1,7 @@
 """Which parameters made which data: checksums that a file carries and its reader expects."""
 
 from flexik import parameters
+from flexik.errors import ParameterError
 from flexik.files import checksum
 from flexik.parameters import parameters_checksum
 
@@ -19,9 +20,10 @@ def selection_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
 
 def network_checksum(crane: parameters.Crane, spring_stiffness: float, name: str) -> str:
     """Checksum of everything that determines network `name`."""
-    return checksum(
-        selection_checksum(crane, spring_stiffness), parameters_checksum([crane.networks[name]])
-    )
+    network = crane.any_network(name)
+    if network is None:
+        raise ParameterError(f"crane.networks: there is no {name!r}")
+    return checksum(selection_checksum(crane, spring_stiffness), parameters_checksum([network]))
 
 
 def evaluation_checksum(crane: parameters.Crane, spring_stiffness: float, label: str) -> str:

@@ -6,6 +6,7 @@ its wall time. Its formula is that of `flexik.learning.perceptron.Network`.
 
 import json
 import math
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -18,7 +19,7 @@ from flexik.learning.perceptron import ACTIVATIONS, Array, Network, Normalisatio
 from flexik.learning.training import StopReason, TrainingRecord
 
 FORMAT = "flexik-network"
-VERSION = 1
+VERSION = 2
 
 
 def save_network(
@@ -47,10 +48,10 @@ def save_network(
         "outputs": [asdict(quantity) for quantity in network.outputs],
         "input_normalisation": _normalisation_lists(network.input_normalisation),
         "output_normalisation": _normalisation_lists(network.output_normalisation),
-        "hidden_weights": network.hidden_weights.tolist(),
-        "hidden_bias": network.hidden_bias.tolist(),
-        "output_weights": network.output_weights.tolist(),
-        "output_bias": network.output_bias.tolist(),
+        "layers": [
+            {"weights": matrix[:, :-1].tolist(), "bias": matrix[:, -1].tolist()}
+            for matrix in network.weights
+        ],
         "training": training,
     }
     try:
@@ -88,13 +89,8 @@ def load_network(
         top.fail("activation", f"is {activation!r}, expected one of {ACTIVATIONS}")
     inputs, outputs = _quantities(top, "inputs"), _quantities(top, "outputs")
     p, q = len(inputs), len(outputs)
-    hidden_bias = top.array("hidden_bias", (None,))
-    h = hidden_bias.size
     network = Network(
-        hidden_weights=top.array("hidden_weights", (h, p)),
-        hidden_bias=hidden_bias,
-        output_weights=top.array("output_weights", (q, h)),
-        output_bias=top.array("output_bias", (q,)),
+        weights=_layers(top, p, q),
         activation=activation,
         input_normalisation=_normalisation(top, "input_normalisation", p),
         output_normalisation=_normalisation(top, "output_normalisation", q),
@@ -181,17 +177,32 @@ def _normalisation(top: _Section, key: str, n_columns: int) -> Normalisation:
         raise DataError(f"{top.path}: {key}: {error}") from error
 
 
-def _quantities(top: _Section, key: str) -> tuple[Quantity, ...]:
-    entries = top.get(key, list)
-    if not entries:
-        top.fail(key, "is empty")
-    quantities = []
-    for index, entry in enumerate(entries):
+def _layers(top: _Section, n_inputs: int, n_outputs: int) -> tuple[Array, ...]:
+    entries = top.get("layers", list)
+    if len(entries) < 2:
+        top.fail("layers", f"holds {len(entries)}, expected a hidden layer and the output layer")
+    matrices: list[Array] = []
+    for index, section in enumerate(_sections(top, "layers", "weights and bias")):
+        n_units = n_outputs if index == len(entries) - 1 else None
+        bias = section.array("bias", (n_units,))
+        n_columns = len(matrices[-1]) if matrices else n_inputs
+        weights = section.array("weights", (bias.size, n_columns))
+        matrices.append(np.column_stack([weights, bias]))
+    return tuple(matrices)
+
+
+def _sections(top: _Section, key: str, content: str) -> Iterator[_Section]:
+    for index, entry in enumerate(top.get(key, list)):
         if not isinstance(entry, dict):
-            top.fail(f"{key}[{index}]", "is not an object with name and unit")
-        section = _Section(top.path, f"{key}[{index}].", entry)
-        quantities.append(Quantity(section.get("name", str), section.get("unit", str)))
-    return tuple(quantities)
+            top.fail(f"{key}[{index}]", f"is not an object with {content}")
+        yield _Section(top.path, f"{key}[{index}].", entry)
+
+
+def _quantities(top: _Section, key: str) -> tuple[Quantity, ...]:
+    if not top.get(key, list):
+        top.fail(key, "is empty")
+    sections = _sections(top, key, "name and unit")
+    return tuple(Quantity(each.get("name", str), each.get("unit", str)) for each in sections)
 
 
 def _record(training: _Section) -> TrainingRecord:
@@ -206,6 +217,7 @@ def _record(training: _Section) -> TrainingRecord:
         seed=training.count("seed"),
         stop_reason=StopReason(reason),
         errors=tuple(training.array("errors", (None,)).tolist()),
+        kept=training.count("kept"),
         selection_error=selection_error,
         restart=training.count("restart"),
         n_restarts=training.count("n_restarts"),

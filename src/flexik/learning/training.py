@@ -1,20 +1,26 @@
 """The one door to training: data and settings in, a network and its training record out.
 
-A new trainer is one settings dataclass and one entry of TRAINERS.
+A new trainer is one file, with its settings and its `minimise`, and one entry of TRAINERS.
 """
 
 import functools
+import itertools
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from flexik.errors import DataError, TrainingError
-from flexik.learning import levenberg_marquardt
-from flexik.learning.levenberg_marquardt import LevenbergMarquardt, Minimum, StopReason, Weights
+from flexik.learning import accelerated, adam, back_propagation, lbfgs, levenberg_marquardt
+from flexik.learning.accelerated import LevenbergMarquardtAccelerated
+from flexik.learning.adam import Adam
+from flexik.learning.back_propagation import BackPropagation
+from flexik.learning.lbfgs import Lbfgs
+from flexik.learning.levenberg_marquardt import LevenbergMarquardt
 from flexik.learning.perceptron import (
     ACTIVATIONS,
     Array,
@@ -22,36 +28,89 @@ from flexik.learning.perceptron import (
     Normalisation,
     Quantity,
 )
+from flexik.learning.problem import Problem, problem
+from flexik.learning.stopping import Minimum, Stopping, StopReason
+from flexik.learning.weights import Weights, initial_weights
 
 __all__ = [
     "TRAINERS",
+    "Adam",
     "Architecture",
+    "BackPropagation",
+    "Lbfgs",
     "LevenbergMarquardt",
+    "LevenbergMarquardtAccelerated",
     "StopReason",
+    "Stopping",
     "TrainingRecord",
     "train",
     "train_best",
+    "trainer_settings",
 ]
 
-Minimiser = Callable[[Weights, str, Array, Array, Any], Minimum]
 
-TRAINERS: dict[type, tuple[str, Minimiser]] = {
-    LevenbergMarquardt: ("levenberg_marquardt", levenberg_marquardt.minimise),
+@dataclass(frozen=True)
+class Trainer:
+    """Settings of a trainer, and its function of start, problem, settings and generator."""
+
+    settings: type[Stopping]
+    minimise: Callable[[Weights, Problem, Any, np.random.Generator], Minimum]
+
+
+TRAINERS = {
+    "levenberg_marquardt": Trainer(LevenbergMarquardt, levenberg_marquardt.minimise),
+    "levenberg_marquardt_accelerated": Trainer(LevenbergMarquardtAccelerated, accelerated.minimise),
+    "back_propagation": Trainer(BackPropagation, back_propagation.minimise),
+    "adam": Trainer(Adam, adam.minimise),
+    "lbfgs": Trainer(Lbfgs, lbfgs.minimise),
 }
+
+
+def trainer_settings(name: str, options: Mapping[str, Any] | None = None) -> Stopping:
+    """Settings of the trainer `name`; what `options` leave out keeps its default.
+
+    Raises
+    ------
+    TrainingError
+        When the trainer or an option is unknown, or a value of another type or out of range.
+    """
+    if name not in TRAINERS:
+        raise TrainingError(f"trainer {name!r} is unknown, expected one of {', '.join(TRAINERS)}")
+    settings = TRAINERS[name].settings
+    known = [setting.name for setting in fields(settings)]
+    for option in options or {}:
+        if option not in known:
+            raise TrainingError(
+                f"trainer {name}: option {option!r} is unknown, expected one of {', '.join(known)}"
+            )
+    try:
+        return settings(**(options or {}))
+    except TrainingError as error:
+        raise TrainingError(f"trainer {name}: {error}") from error
 
 
 @dataclass(frozen=True)
 class Architecture:
-    """Size and activation of the hidden layer; TrainingError when out of range."""
+    """Units of the hidden layer (of several, from the inputs on, one number each) and activation.
 
-    n_hidden: int
+    Raises TrainingError when they are out of range.
+    """
+
+    n_hidden: int | tuple[int, ...]
     activation: str = "tanh"
 
     def __post_init__(self) -> None:
-        if self.n_hidden < 1:
-            raise TrainingError(f"n_hidden={self.n_hidden}, expected at least 1")
+        if isinstance(self.n_hidden, list):
+            object.__setattr__(self, "n_hidden", tuple(self.n_hidden))
+        if not self.hidden_sizes or min(self.hidden_sizes) < 1:
+            raise TrainingError(f"n_hidden={self.n_hidden}, expected at least 1 in every layer")
         if self.activation not in ACTIVATIONS:
             raise TrainingError(f"activation={self.activation!r}, expected one of {ACTIVATIONS}")
+
+    @property
+    def hidden_sizes(self) -> tuple[int, ...]:
+        """Units of every hidden layer."""
+        return self.n_hidden if isinstance(self.n_hidden, tuple) else (self.n_hidden,)
 
 
 @dataclass(frozen=True)
@@ -65,6 +124,8 @@ class TrainingRecord:
     stop_reason : why the run ended
     errors : mean squared error of the normalised outputs per iteration, the first the initial
         one; empty when the run gave no usable network
+    kept : the iteration the network is of; the last one unless the errors rose or the settings
+        asked for selection patience
     selection_error : root mean square of the normalised output errors on the selection data
     n_restarts : number of runs this one competed with, itself among them
     seconds : wall time of the run; nan when read from a file, and no part of equality
@@ -74,6 +135,7 @@ class TrainingRecord:
     seed: int
     stop_reason: StopReason
     errors: tuple[float, ...]
+    kept: int
     selection_error: float | None
     restart: int
     n_restarts: int
@@ -87,7 +149,7 @@ class _Task:
     inputs: Array
     outputs: Array
     architecture: Architecture
-    settings: LevenbergMarquardt
+    settings: Stopping
     seed: int
     n_restarts: int
     quantities: tuple[tuple[Quantity, ...], tuple[Quantity, ...]]
@@ -98,31 +160,40 @@ def train(
     inputs: Array,
     outputs: Array,
     architecture: Architecture,
-    settings: LevenbergMarquardt,
+    settings: Stopping,
     seed: int,
     input_quantities: Sequence[Quantity],
     output_quantities: Sequence[Quantity],
+    selection: tuple[Array, Array] | None = None,
+    restart: int = 0,
 ) -> tuple[Network, TrainingRecord]:
-    """Train one network; the same as restart 0 of `train_best`.
+    """Train one network; the same as restart `restart` of `train_best`.
 
     Parameters
     ----------
     inputs, outputs : (n, p) and (n, q) in physical units; their extremes give the normalisation
+    settings : of one of TRAINERS
     seed : not negative
     input_quantities, output_quantities : names and units of the p and q columns
+    selection : inputs (m, p) and outputs (m, q) the training does not see, if any
 
     Raises
     ------
     DataError
         When the data are empty, not finite, or of shapes that do not belong together.
     TrainingError
-        When there are more weights than numbers to fit, or no usable network results.
+        When there are more weights than numbers to fit, selection patience without selection
+        data, or no usable network.
     """
     quantities = tuple(input_quantities), tuple(output_quantities)
     data = _checked_pair("training", inputs, outputs, quantities)
-    task = _Task(*data, architecture, settings, _checked_seed(seed), 1, quantities, None)
+    if selection is not None:
+        selection = _checked_pair("selection", *selection, quantities)
+    elif settings.selection_patience is not None:
+        raise TrainingError("trainer setting selection_patience needs selection data")
+    task = _Task(*data, architecture, settings, _checked_seed(seed), 1, quantities, selection)
     _check_size(task)
-    network, record = _run(task, 0)
+    network, record = _run(task, restart)
     if network is None:
         raise _no_network(task, [record])
     return network, record
@@ -134,7 +205,7 @@ def train_best(
     selection_inputs: Array,
     selection_outputs: Array,
     architecture: Architecture,
-    settings: LevenbergMarquardt,
+    settings: Stopping,
     seed: int,
     n_restarts: int,
     input_quantities: Sequence[Quantity],
@@ -150,6 +221,7 @@ def train_best(
     inputs, outputs : (n, p) and (n, q) in physical units; their extremes give the normalisation
     selection_inputs, selection_outputs : (m, p) and (m, q), data the training does not see
     seed : restart k starts from the NumPy generator of (seed, k)
+    settings : of one of TRAINERS
     map_function : ``map_function(function, items)`` gives the results in any order; `function`
         can be pickled, so it may run in other processes without changing the result
 
@@ -185,24 +257,26 @@ def train_best(
 
 def _run(task: _Task, restart: int) -> tuple[Network | None, TrainingRecord]:
     started = time.perf_counter()
-    name, minimise = TRAINERS[type(task.settings)]
+    name, trainer = _trainer(task.settings)
     activation = task.architecture.activation
     normalisations = Normalisation.from_data(task.inputs), Normalisation.from_data(task.outputs)
-    unit_inputs = normalisations[0].to_unit(task.inputs)
-    unit_outputs = normalisations[1].to_unit(task.outputs)
-    start = levenberg_marquardt.initial_weights(
-        unit_inputs.shape[1],
-        task.architecture.n_hidden,
-        unit_outputs.shape[1],
+    generator = np.random.default_rng((task.seed, restart))
+    start = initial_weights(
+        task.inputs.shape[1],
+        task.architecture.hidden_sizes,
+        task.outputs.shape[1],
         activation,
-        np.random.default_rng((task.seed, restart)),
+        generator,
     )
-    minimum = minimise(start, activation, unit_inputs, unit_outputs, task.settings)
+    # the order of sums in a product depends on the number of threads, so it is one everywhere
+    with threadpool_limits(1):
+        minimum = trainer.minimise(start, _problem(task, normalisations), task.settings, generator)
     record = TrainingRecord(
         trainer=name,
         seed=task.seed,
         stop_reason=minimum.stop_reason,
         errors=minimum.errors,
+        kept=minimum.kept,
         selection_error=None,
         restart=restart,
         n_restarts=task.n_restarts,
@@ -210,7 +284,8 @@ def _run(task: _Task, restart: int) -> tuple[Network | None, TrainingRecord]:
     )
     if not minimum.errors:
         return None, record
-    network = _network(minimum.weights, activation, normalisations, task.quantities)
+    weights = tuple(matrix.copy() for matrix in minimum.weights)
+    network = Network(weights, activation, *normalisations, *task.quantities)
     if task.selection is not None:
         values, expected = (task.selection[0], normalisations[1].to_unit(task.selection[1]))
         residuals = normalisations[1].to_unit(network.predict(values)) - expected
@@ -218,23 +293,21 @@ def _run(task: _Task, restart: int) -> tuple[Network | None, TrainingRecord]:
     return network, record
 
 
-def _network(
-    weights: Weights,
-    activation: str,
-    normalisations: tuple[Normalisation, Normalisation],
-    quantities: tuple[tuple[Quantity, ...], tuple[Quantity, ...]],
-) -> Network:
-    return Network(
-        hidden_weights=weights.hidden[:, :-1].copy(),
-        hidden_bias=weights.hidden[:, -1].copy(),
-        output_weights=weights.output[:, :-1].copy(),
-        output_bias=weights.output[:, -1].copy(),
-        activation=activation,
-        input_normalisation=normalisations[0],
-        output_normalisation=normalisations[1],
-        inputs=quantities[0],
-        outputs=quantities[1],
-    )
+def _trainer(settings: Stopping) -> tuple[str, Trainer]:
+    for name, trainer in TRAINERS.items():
+        if type(settings) is trainer.settings:
+            return name, trainer
+    raise TrainingError(f"{type(settings).__name__} is not the settings of a trainer")
+
+
+def _problem(task: _Task, normalisations: tuple[Normalisation, Normalisation]) -> Problem:
+    def unit(inputs: Array, outputs: Array) -> tuple[Array, Array]:
+        return normalisations[0].to_unit(inputs), normalisations[1].to_unit(outputs)
+
+    # the trainer sees the selection data only to stop by them
+    asked = task.settings.selection_patience is not None
+    selection = unit(*task.selection) if asked and task.selection is not None else None
+    return problem(task.architecture.activation, *unit(task.inputs, task.outputs), selection)
 
 
 def _selection_error(run: tuple[Network | None, TrainingRecord]) -> float:
@@ -291,9 +364,9 @@ def _checked(role: str, values: Array, quantities: tuple[Quantity, ...]) -> Arra
 
 
 def _check_size(task: _Task) -> None:
-    n_outputs = task.outputs.shape[1]
-    n_hidden = task.architecture.n_hidden
-    n_weights = n_hidden * (task.inputs.shape[1] + 1) + n_outputs * (n_hidden + 1)
+    n_outputs, n_hidden = task.outputs.shape[1], task.architecture.n_hidden
+    sizes = (task.inputs.shape[1], *task.architecture.hidden_sizes, n_outputs)
+    n_weights = sum(n_units * (n_before + 1) for n_before, n_units in itertools.pairwise(sizes))
     if task.outputs.size < n_weights:
         raise TrainingError(
             f"{n_hidden} hidden units have {n_weights} weights, more than the {task.outputs.size} "

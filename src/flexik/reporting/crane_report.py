@@ -16,10 +16,26 @@ from flexik.files import file_checksum, write_json, write_text
 from flexik.mechanisms.crane import CraneGeometry
 from flexik.parameters import parameters_checksum
 from flexik.positioning.initial import initial_positions
-from flexik.reporting import crane_figures, crane_schematic, error_figures, page, tables
+from flexik.reporting import (
+    crane_figures,
+    crane_schematic,
+    error_figures,
+    learning_figures,
+    page,
+    tables,
+)
 
 STAND_IN = (2.0, -3.95)
 GA_DIAGNOSTIC = "corrected_n_generations"
+SIZE_TABLE = [
+    "n_hidden",
+    "training_error",
+    "selection_error",
+    "median_selection_error",
+    "worst_selection_error",
+    "best_restart",
+    "n_failed",
+]
 BEAMS = ("pillar", "lift", "jib", "extension")
 
 
@@ -32,6 +48,7 @@ class Results:
     published : published statistics in mm, see evaluation.errors.comparison.
     mesh_study : frame of multibody.mesh_study.
     training : a row for every restart of every network.
+    studies : frame of learning.size_selection.by_size, and the chosen size, by network.
     shape : see reporting.crane_schematic.
     """
 
@@ -43,6 +60,7 @@ class Results:
     published: pd.DataFrame
     mesh_study: pd.DataFrame
     training: pd.DataFrame
+    studies: Mapping[str, tuple[pd.DataFrame, int]]
     shape: Mapping[str, Any]
 
     @property
@@ -73,6 +91,8 @@ def _write_metrics(results: Results, folder: Path) -> None:
         metrics[f"{label}.n_failed"] = int(found["n_failed"])
     for name, table in (("grid", results.grid), ("selection", results.selection)):
         metrics |= {f"{name}.{key}": value for key, value in counts(table).items()}
+    for name, (_, n_hidden) in results.studies.items():
+        metrics[f"select.{name}.n_hidden"] = n_hidden
     metrics["calibration.spring_stiffness_nm_per_rad"] = results.spring_stiffness
     write_json(folder / "metrics.json", metrics)
 
@@ -99,6 +119,9 @@ def _write_tables(results: Results, folder: Path) -> None:
     training = results.training.rename(columns=lambda name: name.replace("_", " "))
     tables.write_table(folder / "training", training, decimals, caption)
 
+    for name, (sizes, _) in results.studies.items():
+        _write_sizes_table(results, name, sizes, folder)
+
     columns = [field.name for field in CONDITION_FIELDS]
     every = [frame[columns].assign(method=label) for label, frame in results.errors.items()]
     # micrometres: what another machine may differ in lies below
@@ -117,6 +140,31 @@ def _write_mesh_table(results: Results, folder: Path) -> None:
     study = tables.mesh_table(study).assign(**shares)
     decimals = {str(name): 2 if name in shares else 3 for name in study}
     tables.write_table(folder / "mesh_study", study, decimals, caption)
+
+
+def _write_sizes_table(results: Results, name: str, sizes: pd.DataFrame, folder: Path) -> None:
+    select = results.crane.selected_networks[name].select
+    caption = (
+        f"{name}: root mean square errors of the normalised outputs by number of hidden neurons; "
+        f"best restart of {select.n_restarts} by selection error."
+    )
+    n_hidden = list(sizes["n_hidden"])
+    chosen = results.studies[name][1]
+    notes = [f"chosen: {chosen}, published: {_published_size(results.crane, name)}"]
+    if chosen in (n_hidden[0], n_hidden[-1]):
+        notes.append(
+            "The choice lies at the end of the range: a wider range may have a better size."
+        )
+    table = sizes[SIZE_TABLE].rename(columns=lambda column: column.replace("_", " "))
+    decimals = {str(column): 5 for column in table if "error" in str(column)}
+    tables.write_table(folder / "size_selection" / name, table, decimals, caption, notes)
+
+
+def _published_size(crane: parameters.Crane, name: str) -> int | None:
+    """n_hidden of the network with a given size of the same kind, the published one."""
+    kind = crane.selected_networks[name].kind
+    sizes = [network.n_hidden for network in crane.networks.values() if network.kind == kind]
+    return sizes[0] if sizes else None
 
 
 def _point_notes(crane: parameters.Crane) -> list[str]:
@@ -172,6 +220,13 @@ def _write_figures(results: Results, folder: Path) -> None:
     for label in crane.methods:
         path = folder / f"positioning_errors_{label}.png"
         error_figures.positioning_errors(path, errors["none"], errors[label], label)
+    for name, (sizes, chosen) in results.studies.items():
+        path = folder / f"size_selection_{name}.png"
+        published, tolerance = (
+            _published_size(crane, name),
+            crane.selected_networks[name].select.tolerance,
+        )
+        learning_figures.size_selection(path, sizes, chosen, published, tolerance)
     compared = comparison(results.statistics, results.published, results.published_columns)
     error_figures.method_comparison(folder / "method_comparison.png", compared)
 
@@ -188,6 +243,7 @@ def _write_page(results: Results, folder: Path, published_file: Path) -> None:
             [(figures / "crane.png", "The crane, rigid and in static equilibrium.")],
         ),
         _training_section(results, folder),
+        _sizes_section(results, folder),
     ]
     made_with = {}
     for name in type(crane).model_fields:
@@ -238,5 +294,20 @@ def _training_section(results: Results, folder: Path) -> page.Section:
             (figures / "initial_positions.png", "Initial positions (after figure 4.4)."),
             (figures / "sequences.png", "Normalised strokes and payload (after figure 4.5)."),
             (figures / "normalised_deflection.png", "Normalised deflection (after figure 4.6)."),
+        ],
+    )
+
+
+def _sizes_section(results: Results, folder: Path) -> page.Section:
+    names = list(results.studies)
+    return page.Section(
+        "Size selection",
+        "Networks of every size from several starts (Rouvinen 1999, chapter 2.4.5). Three disjoint "
+        "sets: the grid trains, the random selection set chooses restart and size, the test "
+        "conditions judge.",
+        [folder / "size_selection" / f"{name}.md" for name in names],
+        [
+            (folder / "figures" / f"size_selection_{name}.png", f"Size selection of {name}.")
+            for name in names
         ],
     )

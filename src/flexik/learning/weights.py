@@ -1,0 +1,143 @@
+"""Weights of a perceptron: one matrix a layer, first draws, and the passes through the layers.
+
+Everything here is in normalised values. Samples lie along the last axis, contiguous in memory,
+because the passes multiply whole rows of samples.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from flexik.learning.perceptron import Array, activate, bend, slope
+
+# One matrix (units, inputs of the layer + 1) a layer, the output layer last; last column: bias
+Weights = tuple[Array, ...]
+
+
+def flatten(weights: Sequence[Array]) -> Array:
+    """One vector (w,): layer by layer, each row by row."""
+    return np.concatenate([matrix.ravel() for matrix in weights])
+
+
+def unflatten(vector: Array, like: Weights) -> Weights:
+    """Matrices of the shapes of `like`, the inverse of `flatten`; views of `vector`."""
+    ends = np.cumsum([matrix.size for matrix in like])[:-1]
+    parts = np.split(vector, ends)
+    return tuple(part.reshape(matrix.shape) for part, matrix in zip(parts, like, strict=True))
+
+
+def moved(weights: Weights, step: Array) -> Weights:
+    """Weights after the flat `step` (w,)."""
+    return tuple(w + s for w, s in zip(weights, unflatten(step, weights), strict=True))
+
+
+def initial_weights(
+    n_inputs: int,
+    hidden_sizes: Sequence[int],
+    n_outputs: int,
+    activation: str,
+    generator: np.random.Generator,
+) -> Weights:
+    """Nguyen-Widrow weights for inputs in [-1, 1], as MATLAB's initnw draws them.
+
+    Source: Nguyen and Widrow 1990. The units of a hidden layer share out the range of its inputs;
+    their net inputs span [-2, 2] for tanh and [-4, 4] for logistic. Output weights are uniform in
+    [-1, 1].
+    """
+    matrices = []
+    for k, n_units in enumerate(hidden_sizes):
+        matrix = _nguyen_widrow(n_inputs, n_units, activation, generator)
+        if k > 0 and activation == "logistic":
+            # inputs of this layer lie in [0, 1], not in [-1, 1]
+            matrix[:, -1] -= matrix[:, :-1].sum(axis=1)
+            matrix[:, :-1] *= 2.0
+        matrices.append(matrix)
+        n_inputs = n_units
+    matrices.append(generator.uniform(-1.0, 1.0, (n_outputs, n_inputs + 1)))
+    return tuple(matrices)
+
+
+def _nguyen_widrow(
+    n_inputs: int, n_units: int, activation: str, generator: np.random.Generator
+) -> Array:
+    direction = generator.uniform(-1.0, 1.0, (n_units, n_inputs))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    active_half_range = 2.0 if activation == "tanh" else 4.0
+    magnitude = active_half_range * 0.7 * n_units ** (1.0 / n_inputs)
+    shift = np.linspace(-1.0, 1.0, n_units) if n_units > 1 else np.zeros(1)
+    bias = shift * np.sign(direction[:, 0])
+    return magnitude * np.column_stack([direction, bias])
+
+
+def forward(
+    weights: Weights, activation: str, inputs: Array, last: Array | None = None
+) -> tuple[list[Array], Array]:
+    """Outputs of all layers for inputs (p + 1, c), whose last row is 1.
+
+    Parameters
+    ----------
+    last : (units + 1, c), where to write the last hidden layer
+
+    Returns
+    -------
+    layers : `inputs` and the output (units + 1, c) of every hidden layer, last row 1
+    outputs : (q, c)
+    """
+    layers = [inputs]
+    for k, matrix in enumerate(weights[:-1], start=1):
+        if last is not None and k == len(weights) - 1:
+            layer = last
+        else:
+            layer = np.empty((len(matrix) + 1, inputs.shape[1]))
+        np.matmul(matrix, layers[-1], out=layer[:-1])
+        activate(layer[:-1], activation, out=layer[:-1])
+        layer[-1] = 1.0
+        layers.append(layer)
+    return layers, weights[-1] @ layers[-1]
+
+
+def slopes_of(layers: list[Array], activation: str) -> list[Array]:
+    """Derivative (units, c) of the activation in every hidden layer of `forward`."""
+    return [slope(layer[:-1], activation) for layer in layers[1:]]
+
+
+def backward(weights: Weights, layers: list[Array], slopes: list[Array], errors: Array) -> Array:
+    """J^T errors (w,) for output errors (q, c): equations 51 to 53 with linear outputs.
+
+    Parameters
+    ----------
+    layers, slopes : of `forward` and `slopes_of`
+    """
+    parts = [errors @ layers[-1].T]
+    for k in range(len(weights) - 1, 0, -1):
+        errors = weights[k][:, :-1].T @ errors
+        errors *= slopes[k - 1]
+        parts.append(errors @ layers[k - 1].T)
+    return flatten(parts[::-1])
+
+
+def second_derivative(
+    weights: Weights, activation: str, layers: list[Array], slopes: list[Array], direction: Weights
+) -> Array:
+    """Second derivative (q, c) of the outputs along `direction` in the space of the weights.
+
+    Parameters
+    ----------
+    layers, slopes : of `forward` and `slopes_of`
+    """
+    # first and second derivative of the net inputs of a layer, then of its outputs; the inputs of
+    # the first layer do not change
+    net_first = direction[0] @ layers[0]
+    net_second = np.zeros(0)
+    for k, slopes_k in enumerate(slopes, start=1):
+        first = slopes_k * net_first
+        second = bend(layers[k][:-1], activation)
+        second *= first
+        second *= net_first
+        if k > 1:
+            second += slopes_k * net_second
+        net_second = weights[k][:, :-1] @ second
+        net_second += 2.0 * direction[k][:, :-1] @ first
+        if k < len(slopes):
+            net_first = direction[k] @ layers[k] + weights[k][:, :-1] @ first
+    return net_second

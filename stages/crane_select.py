@@ -1,0 +1,75 @@
+"""Train one network in many sizes, from several starts each, and choose its size.
+
+Usage: crane_select.py NETWORK, a name under crane.selected_networks.
+Reads params.yaml: parallel, crane.selected_networks.NETWORK (and crane.geometry, crane.structure,
+crane.grid, crane.selection to know which data belong to it); the tables of crane_generate.
+Writes data/crane/size_selection/NETWORK.parquet, one row a run, and NETWORK.json with the chosen
+n_hidden. Killed and run again it goes on where it was.
+"""
+
+import sys
+from pathlib import Path
+
+from flexik import datasets, learning, stage
+from flexik.datasets.crane import axis
+from flexik.datasets.crane_learning import INPUT_FIELDS, KINDS, read_learning_data
+from flexik.datasets.parallel import ParallelSettings, from_environment
+from flexik.datasets.provenance import network_checksum
+from flexik.datasets.tables import read_table
+from flexik.errors import ParameterError
+from flexik.files import checksum, read_json, source_checksum, write_json
+from flexik.learning.perceptron import quantities
+from flexik.learning.size_selection import FIELDS, Study, by_size, choose, run_study
+from flexik.learning.training import Architecture, trainer_settings
+from flexik.parameters import load_parameters
+
+DATA = Path("data/crane")
+
+
+def main() -> None:
+    """Run the stage."""
+    parameters = load_parameters()
+    crane, name = parameters.crane, sys.argv[1]
+    if name not in crane.selected_networks:
+        known = ", ".join(crane.selected_networks)
+        raise ParameterError(f"crane.selected_networks: there is no {name!r} ({known})")
+    chosen = crane.selected_networks[name]
+    select = chosen.select
+    sizes = [round(size) for size in axis(**select.n_hidden.model_dump())]
+    stiffness = read_json(DATA / "calibration.json")["spring_stiffness"]
+    data = read_learning_data(DATA, crane, stiffness, chosen.kind)
+    trainer = select.trainer.model_dump()
+    study = Study(
+        data.inputs,
+        data.outputs,
+        data.selection_inputs,
+        data.selection_outputs,
+        Architecture(sizes[0], chosen.activation),
+        trainer_settings(trainer.pop("kind"), trainer),
+        chosen.seed,
+        quantities(INPUT_FIELDS),
+        quantities(KINDS[chosen.kind].outputs),
+    )
+    made_with = network_checksum(crane, stiffness, name)
+    folder = DATA / "size_selection"
+    path = folder / f"{name}.parquet"
+    reused = run_study(
+        path,
+        study,
+        sizes,
+        select.n_restarts,
+        made_with,
+        checksum(made_with, source_checksum(datasets, learning)),
+        from_environment(ParallelSettings(**parameters.parallel.model_dump())),
+        f"select {name}",
+    )
+    if reused:
+        print(f"{name}: {reused} runs were there from an interrupted study")
+    table = by_size(read_table(path, FIELDS, made_with))
+    n_hidden = choose(table, select.tolerance)
+    print(f"{name}: {n_hidden} hidden neurons, {table['n_failed'].sum()} failed runs")
+    write_json(folder / f"{name}.json", {"n_hidden": n_hidden})
+
+
+if __name__ == "__main__":
+    stage.run(main)
