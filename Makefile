@@ -14,6 +14,7 @@ export PATH := $(CURDIR)/$(BIN):$(PATH)
 .PHONY: repro smoke test lint benchmark setup clean
 
 repro: $(VENV)/.pipeline ## run the pipeline; only what changed is computed
+	$(BIN)/python stages/validate.py --check
 	$(BIN)/dvc repro
 
 smoke: $(VENV)/.pipeline ## the same pipeline on a tiny configuration, in a temporary copy
@@ -27,7 +28,7 @@ lint: $(VENV)/.dev ## formatting, lint and types
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
-benchmark: $(VENV)/.dev ## timings beside other ways; writes reports/benchmarks/
+benchmark: $(VENV)/.dev ## timings of the generation beside other ways; writes reports/benchmarks/
 	$(BIN)/python benchmarks/generate.py
 
 setup: $(VENV)/.dev ## everything a developer needs

@@ -8,7 +8,6 @@ Writes data/crane/evaluations/METHOD.parquet.
 """
 
 import functools
-import sys
 from pathlib import Path
 
 from flexik import parameters, stage
@@ -17,10 +16,9 @@ from flexik.datasets.provenance import evaluation_checksum, network_checksum
 from flexik.errors import ParameterError
 from flexik.evaluation.conditions import all_conditions
 from flexik.evaluation.errors import evaluate, statistics
-from flexik.files import read_json
 from flexik.learning.storage import load_network
 from flexik.mechanisms.crane import CraneGeometry
-from flexik.multibody.assembly import flexible_crane
+from flexik.multibody.assembly import flexible_crane, read_spring_stiffness
 from flexik.multibody.crane import tips
 from flexik.parameters import load_parameters
 from flexik.positioning import build_method
@@ -36,8 +34,8 @@ FOLDER = Path("data/crane")
 def main() -> None:
     """Run the stage."""
     crane = load_parameters().crane
-    label = sys.argv[1]
-    stiffness = read_json(FOLDER / "calibration.json")["spring_stiffness"]
+    label = stage.argument("METHOD")
+    stiffness = read_spring_stiffness(FOLDER / "calibration.json")
     model = flexible_crane(crane, stiffness)
     conditions = all_conditions(crane.evaluation.points, crane.evaluation.payloads)
     initial = initial_positions(model.geometry, conditions.targets)

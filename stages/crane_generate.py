@@ -24,8 +24,8 @@ from flexik.datasets.parallel import ParallelSettings, from_environment
 from flexik.datasets.provenance import grid_checksum, selection_checksum
 from flexik.datasets.tables import read_table
 from flexik.errors import SolverError
-from flexik.files import checksum, read_json, source_checksum
-from flexik.multibody.assembly import flexible_crane
+from flexik.files import checksum, source_checksum
+from flexik.multibody.assembly import flexible_crane, read_spring_stiffness
 from flexik.parameters import load_parameters
 
 FOLDER = Path("data/crane")
@@ -37,7 +37,7 @@ def main() -> None:
     parameters = load_parameters()
     crane = parameters.crane
     settings = from_environment(ParallelSettings(**parameters.parallel.model_dump()))
-    stiffness = read_json(FOLDER / "calibration.json")["spring_stiffness"]
+    stiffness = read_spring_stiffness(FOLDER / "calibration.json")
     model = flexible_crane(crane, stiffness)
     axes = {name: axis(**getattr(crane.grid, name).model_dump()) for name in GridParts.AXES}
     selection = random_samples(

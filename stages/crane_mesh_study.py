@@ -8,8 +8,8 @@ from pathlib import Path
 
 from flexik import stage
 from flexik.datasets.crane import random_samples
-from flexik.files import read_json, write_text
-from flexik.multibody.assembly import flexible_crane
+from flexik.files import write_text
+from flexik.multibody.assembly import flexible_crane, read_spring_stiffness
 from flexik.multibody.mesh_study import mesh_study
 from flexik.parameters import load_parameters
 
@@ -19,7 +19,7 @@ OUTPUT = Path("data/crane/mesh_study.csv")
 def main() -> None:
     """Run the stage."""
     crane = load_parameters().crane
-    model = flexible_crane(crane, read_json("data/crane/calibration.json")["spring_stiffness"])
+    model = flexible_crane(crane, read_spring_stiffness("data/crane/calibration.json"))
     settings = crane.mesh_study
     samples = random_samples(
         model.geometry,
@@ -29,6 +29,7 @@ def main() -> None:
         settings.seed,
     )
     table = mesh_study(model, samples.strokes, samples.payload, settings.refinements)
+    table.insert(0, "n_samples", settings.n_samples)
     write_text(OUTPUT, table.to_csv(index=False))
 
 

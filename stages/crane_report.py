@@ -19,22 +19,23 @@ from flexik.datasets.provenance import (
     network_checksum,
     selection_checksum,
 )
-from flexik.datasets.tables import read_table
-from flexik.errors import DataError
+from flexik.datasets.tables import read_csv, read_table
 from flexik.files import read_json
 from flexik.learning.size_selection import FIELDS as STUDY_FIELDS
 from flexik.learning.size_selection import by_size
+from flexik.multibody.assembly import read_spring_stiffness
 from flexik.parameters import load_parameters
 from flexik.reporting.crane_report import Results, write_report
 
 DATA, REPORTS = Path("data/crane"), Path("reports/crane")
+MESH_COLUMNS = ("n_samples", "element", "refinement", "mean_relative", "max_relative")
 PUBLISHED = Path("data/reference/crane/positioning_errors.csv")
 
 
 def main() -> None:
     """Run the stage."""
     crane = load_parameters().crane
-    stiffness = read_json(DATA / "calibration.json")["spring_stiffness"]
+    stiffness = read_spring_stiffness(DATA / "calibration.json")
     errors = {
         label: read_evaluation(
             DATA / "evaluations" / f"{label}.parquet",
@@ -43,7 +44,9 @@ def main() -> None:
         for label in ("none", *crane.methods)
     }
     names = [*crane.networks, *crane.selected_networks]
-    training = {name: read_csv(DATA / "networks" / f"{name}_training.csv") for name in names}
+    training = {
+        name: read_csv(DATA / "networks" / f"{name}_training.csv", ("restart",)) for name in names
+    }
     studies = {}
     for name in crane.selected_networks:
         made_with = network_checksum(crane, stiffness, name)
@@ -57,21 +60,13 @@ def main() -> None:
         grid=read_table(DATA / "grid.parquet", FIELDS, grid_checksum(crane, stiffness)),
         selection=read_table(DATA / "selection.parquet", FIELDS, selection_made),
         errors=errors,
-        published=read_csv(PUBLISHED),
-        mesh_study=read_csv(DATA / "mesh_study.csv"),
+        published=read_csv(PUBLISHED, ("statistic", "none")),
+        mesh_study=read_csv(DATA / "mesh_study.csv", MESH_COLUMNS),
         training=pd.concat(training, names=["network"]).reset_index(level="network"),
         studies=studies,
         shape=read_json(DATA / "shape.json"),
     )
     write_report(results, REPORTS, PUBLISHED)
-
-
-def read_csv(path: Path) -> pd.DataFrame:
-    """Table in the CSV file `path`; raises DataError if there is none."""
-    try:
-        return pd.read_csv(path)
-    except (OSError, ValueError) as error:
-        raise DataError(f"{path}: expected a CSV table ({error})") from None
 
 
 if __name__ == "__main__":

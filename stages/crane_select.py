@@ -7,7 +7,6 @@ Writes data/crane/size_selection/NETWORK.parquet, one row a run, and NETWORK.jso
 n_hidden. Killed and run again it goes on where it was.
 """
 
-import sys
 from pathlib import Path
 
 from flexik import datasets, learning, stage
@@ -17,10 +16,11 @@ from flexik.datasets.parallel import ParallelSettings, from_environment
 from flexik.datasets.provenance import network_checksum
 from flexik.datasets.tables import read_table
 from flexik.errors import ParameterError
-from flexik.files import checksum, read_json, source_checksum, write_json
+from flexik.files import checksum, source_checksum, write_json
 from flexik.learning.perceptron import quantities
 from flexik.learning.size_selection import FIELDS, Study, by_size, choose, run_study
 from flexik.learning.training import Architecture, trainer_settings
+from flexik.multibody.assembly import read_spring_stiffness
 from flexik.parameters import load_parameters
 
 DATA = Path("data/crane")
@@ -29,14 +29,14 @@ DATA = Path("data/crane")
 def main() -> None:
     """Run the stage."""
     parameters = load_parameters()
-    crane, name = parameters.crane, sys.argv[1]
+    crane, name = parameters.crane, stage.argument("NETWORK")
     if name not in crane.selected_networks:
         known = ", ".join(crane.selected_networks)
         raise ParameterError(f"crane.selected_networks: there is no {name!r} ({known})")
     chosen = crane.selected_networks[name]
     select = chosen.select
     sizes = [round(size) for size in axis(**select.n_hidden.model_dump())]
-    stiffness = read_json(DATA / "calibration.json")["spring_stiffness"]
+    stiffness = read_spring_stiffness(DATA / "calibration.json")
     data = read_learning_data(DATA, crane, stiffness, chosen.kind)
     trainer = select.trainer.model_dump()
     study = Study(

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from flexik import stage
-from flexik.files import read_json, write_json
+from flexik.files import write_json
 from flexik.mechanisms.crane import forward
-from flexik.multibody.assembly import flexible_crane
+from flexik.multibody.assembly import flexible_crane, read_spring_stiffness
 from flexik.multibody.crane import equilibrium, reference_shapes
 from flexik.parameters import load_parameters
 
@@ -21,7 +21,7 @@ OUTPUT = Path("data/crane/shape.json")
 def main() -> None:
     """Run the stage."""
     crane = load_parameters().crane
-    model = flexible_crane(crane, read_json("data/crane/calibration.json")["spring_stiffness"])
+    model = flexible_crane(crane, read_spring_stiffness("data/crane/calibration.json"))
     strokes, payload = crane.illustration.strokes, crane.illustration.payload
     solved = equilibrium(model, strokes, payload)
     write_json(

@@ -8,7 +8,6 @@ Writes data/crane/networks/NETWORK.json and the training records NETWORK_trainin
 """
 
 import functools
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +17,12 @@ from flexik import parameters, stage
 from flexik.datasets.crane_learning import INPUT_FIELDS, KINDS, read_learning_data
 from flexik.datasets.parallel import ParallelSettings, from_environment, parallel_map
 from flexik.datasets.provenance import network_checksum
-from flexik.errors import ParameterError
+from flexik.errors import DataError, ParameterError, TrainingError
 from flexik.files import read_json, write_text
 from flexik.learning.perceptron import quantities
 from flexik.learning.storage import save_network
 from flexik.learning.training import Architecture, TrainingRecord, train_best, trainer_settings
+from flexik.multibody.assembly import read_spring_stiffness
 from flexik.parameters import load_parameters
 
 DATA = Path("data/crane")
@@ -31,28 +31,32 @@ DATA = Path("data/crane")
 def main() -> None:
     """Run the stage."""
     given = load_parameters()
-    crane, name = given.crane, sys.argv[1]
+    crane, name = given.crane, stage.argument("NETWORK")
     network = crane.any_network(name)
     if network is None:
         known = ", ".join([*crane.networks, *crane.selected_networks])
         raise ParameterError(f"crane.networks: there is no {name!r} ({known})")
-    stiffness = read_json(DATA / "calibration.json")["spring_stiffness"]
+    stiffness = read_spring_stiffness(DATA / "calibration.json")
     data = read_learning_data(DATA, crane, stiffness, network.kind)
     trainer = network.trainer.model_dump()
     settings = from_environment(ParallelSettings(**given.parallel.model_dump()))
-    best, record, records = train_best(
-        data.inputs,
-        data.outputs,
-        data.selection_inputs,
-        data.selection_outputs,
-        Architecture(size_of(network, name), network.activation),
-        trainer_settings(trainer.pop("kind"), trainer),
-        network.seed,
-        network.n_restarts,
-        quantities(INPUT_FIELDS),
-        quantities(KINDS[network.kind].outputs),
-        functools.partial(parallel_map, settings=settings, description=f"train {name}"),
-    )
+    try:
+        architecture = Architecture(size_of(network, name), network.activation)
+        best, record, records = train_best(
+            data.inputs,
+            data.outputs,
+            data.selection_inputs,
+            data.selection_outputs,
+            architecture,
+            trainer_settings(trainer.pop("kind"), trainer),
+            network.seed,
+            network.n_restarts,
+            quantities(INPUT_FIELDS),
+            quantities(KINDS[network.kind].outputs),
+            functools.partial(parallel_map, settings=settings, description=f"train {name}"),
+        )
+    except TrainingError as error:
+        raise TrainingError(f"network {name}: {error}") from None
     folder = DATA / "networks"
     save_network(folder / f"{name}.json", best, record, network_checksum(crane, stiffness, name))
     write_text(folder / f"{name}_training.csv", summary(records, best.n_hidden))
@@ -63,7 +67,11 @@ def size_of(network: parameters.NetworkModel | parameters.SelectedNetwork, name:
     """Number of hidden neurons, given or chosen."""
     if isinstance(network, parameters.NetworkModel):
         return network.n_hidden
-    return int(read_json(DATA / "size_selection" / f"{name}.json")["n_hidden"])
+    path = DATA / "size_selection" / f"{name}.json"
+    chosen = read_json(path)
+    if not isinstance(chosen, dict) or not isinstance(chosen.get("n_hidden"), int):
+        raise DataError(f"{path}: expected an integer n_hidden")
+    return chosen["n_hidden"]
 
 
 def summary(records: list[TrainingRecord], n_hidden: int | tuple[int, ...]) -> str:

@@ -221,21 +221,24 @@ def test_generated_tables_are_the_same_for_one_and_two_workers(crane, mixed, tmp
 # Keys of params.yaml changed one at a time, and the checksums each must change
 GRID, SELECTION, NETWORK = "grid", "selection", "network"
 NONE, COMBINED, GA = "none", "combined", "combined_ga"
-EVERYTHING = {GRID, SELECTION, NETWORK, NONE, COMBINED, GA}
+CHOSEN = "combined_selected"
+EVERYTHING = {GRID, SELECTION, NETWORK, NONE, COMBINED, GA, CHOSEN}
 COVERED = {
     "geometry.rocker_length": EVERYTHING,
     "structure.gravity": EVERYTHING,
     "structure.beams.jib.n_elements": EVERYTHING,
-    "grid.lift.increment": EVERYTHING - {NONE},
+    "grid.lift.increment": EVERYTHING - {NONE, SELECTION},
     "grid.minimum_tip_x": EVERYTHING - {NONE},
     "selection.seed": EVERYTHING - {GRID, NONE},
     "networks.deflection.n_hidden": {NETWORK, COMBINED, GA},
     "networks.deflection.trainer.mu": {NETWORK, COMBINED, GA},
-    "evaluation.payloads.0": {NONE, COMBINED, GA},
+    "selected_networks.deflection_selected.seed": {CHOSEN},
+    "selected_networks.deflection_selected.select.n_hidden.maximum": {CHOSEN},
+    "evaluation.payloads.0": {NONE, COMBINED, GA, CHOSEN},
     "methods.combined.n_corrections": {COMBINED},
     "methods.combined_ga.n_corrections": {GA},
     "methods.combined_ga.genetic.seed": {GA},
-    "calibration.published_mean_error": set(),
+    "calibration.stiffness_range.0": set(),
     "mesh_study.seed": set(),
     "illustration.payload": set(),
 }
@@ -247,7 +250,10 @@ def checksums(data, spring=SPRING):
         GRID: grid_checksum(crane, spring),
         SELECTION: selection_checksum(crane, spring),
         NETWORK: network_checksum(crane, spring, "deflection"),
-        **{label: evaluation_checksum(crane, spring, label) for label in (NONE, COMBINED, GA)},
+        **{
+            label: evaluation_checksum(crane, spring, label)
+            for label in (NONE, COMBINED, GA, CHOSEN)
+        },
     }
 
 
@@ -286,3 +292,9 @@ def test_the_order_of_keys_does_not_matter():
     data["crane"] = dict(reversed(data["crane"].items()))
     data["crane"]["grid"] = dict(reversed(data["crane"]["grid"].items()))
     assert checksums(data) == checksums(raw())
+
+
+def test_strokes_that_do_not_assemble_fail_and_are_not_left_out(crane):
+    samples = Samples(np.array([[0.1, 3.0, 1.0], [0.1, 0.1, 1.0]]), np.full(2, 100.0))
+    columns = solve_samples(crane, 0.0, samples)
+    assert columns["status"].tolist() == [FAILED, KEPT]

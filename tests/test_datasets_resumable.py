@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from flexik.datasets.parallel import ParallelSettings
-from flexik.datasets.resumable import compute_table
+from flexik.datasets.resumable import _sole_run, compute_table
 from flexik.datasets.tables import Field, read_table, table_metadata
 from flexik.errors import DataError, SolverError
 
@@ -205,3 +205,25 @@ def test_killed_and_run_again(tmp_path, expected):
     assert {part: calls(tmp_path)[part] for part in finished} == dict.fromkeys(finished, 1)
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["grid.parquet"]
     assert not (tmp_path / "parts").exists()
+
+
+def test_a_second_run_waits_for_the_first(tmp_path, capfd):
+    """Killing DVC may leave its stage at work on the same parts."""
+    script = (
+        "import fcntl, sys, time\n"
+        "lock = open(sys.argv[1], 'w')\n"
+        "fcntl.flock(lock, fcntl.LOCK_EX)\n"
+        "print('locked', flush=True)\n"
+        "time.sleep(0.7)\n"
+        "open(sys.argv[2], 'w').close()\n"
+    )
+    folder, done = tmp_path / ".parts", tmp_path / "first_is_done"
+    other = subprocess.Popen(
+        [sys.executable, "-c", script, f"{folder}.lock", str(done)], stdout=subprocess.PIPE
+    )
+    assert other.stdout.readline() == b"locked\n"
+    with _sole_run(folder):
+        assert done.exists()
+    assert "waiting for another run" in capfd.readouterr().err
+    other.communicate()
+    assert [child.name for child in tmp_path.iterdir()] == ["first_is_done"]

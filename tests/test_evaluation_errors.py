@@ -115,6 +115,10 @@ def test_comparison_in_millimetres_beside_the_published():
     assert table["none"].tolist() == pytest.approx([1, 2, 3, 4, 5, 6])
     assert table.loc["max_error", "none published"] == 129.6755
     assert table.loc["max_error", "combined (genetic) published"] == 9.2058
+    unpublished = comparison({"none": ours, "mine": ours}, published, {"mine": None})
+    assert unpublished["mine"].tolist() == pytest.approx([1, 2, 3, 4, 5, 6])
+    assert unpublished["mine published"].isna().all()
+    assert unpublished["none published"].equals(table["none published"])
     with pytest.raises(DataError, match="no column 'other'"):
         comparison({"other": ours}, published)
     with pytest.raises(DataError, match="mean_error"):

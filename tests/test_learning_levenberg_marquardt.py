@@ -1,299 +1,345 @@
-"""Levenberg-Marquardt: derivatives, the step of equation 56, schedule and stop reasons."""
+"""Both Levenberg-Marquardt trainers: known minima, schedules of mu, stop reasons."""
 
 import functools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from learning_problems import dense, errors_function, some_problem, taught
 from scipy.optimize import least_squares
 
 from flexik.errors import TrainingError
-from flexik.learning import levenberg_marquardt as lm
-from flexik.learning.levenberg_marquardt import LevenbergMarquardt, StopReason, Weights
+from flexik.learning import accelerated, levenberg_marquardt
+from flexik.learning.accelerated import LevenbergMarquardtAccelerated, with_solved_outputs
+from flexik.learning.levenberg_marquardt import LevenbergMarquardt
+from flexik.learning.normal_equations import NormalEquations, normal_equations
 from flexik.learning.perceptron import ACTIVATIONS
+from flexik.learning.problem import Problem
+from flexik.learning.stopping import Minimum, Stopping, StopReason
+from flexik.learning.weights import (
+    Weights,
+    flatten,
+    forward,
+    initial_weights,
+    moved,
+    slopes_of,
+    unflatten,
+)
 
-FUNCTIONS = {"tanh": torch.tanh, "logistic": torch.sigmoid}
+MODULES = {
+    LevenbergMarquardt: levenberg_marquardt,
+    LevenbergMarquardtAccelerated: accelerated,
+}
+TRAINERS = tuple(MODULES)
+HIDDEN = [(4,), (4, 3)]
+UNLIMITED = {"minimum_gradient": 0.0, "minimum_progress": 0.0, "n_iterations": 10_000}
 
-
-def problem(
-    n: int = 40, p: int = 3, q: int = 2, h: int = 4, activation: str = "tanh", seed: int = 0
-):
-    """Smooth data with a little noise, and Nguyen-Widrow weights."""
-    generator = np.random.default_rng(seed)
-    inputs = generator.uniform(-1.0, 1.0, (n, p))
-    mixed = inputs @ generator.normal(size=(p, q))
-    targets = np.sin(2.0 * mixed) + 0.02 * generator.normal(size=(n, q))
-    weights = lm.initial_weights(p, h, q, activation, np.random.default_rng(seed))
-    return weights, activation, inputs, targets
-
-
-def flat(weights: Weights) -> np.ndarray:
-    return np.concatenate([weights.hidden.ravel(), weights.output.ravel()])
-
-
-def residuals(vector: torch.Tensor, weights: Weights, activation: str, inputs, targets):
-    """Plain network errors (n * q,), written independently for autograd."""
-    h, p = weights.hidden.shape[0], weights.hidden.shape[1] - 1
-    first = vector[: h * (p + 1)].reshape(h, p + 1)
-    second = vector[h * (p + 1) :].reshape(-1, h + 1)
-    ones = torch.ones(len(inputs), 1, dtype=torch.float64)
-    hidden = FUNCTIONS[activation](torch.cat([torch.from_numpy(inputs), ones], 1) @ first.T)
-    outputs = torch.cat([hidden, ones], 1) @ second.T
-    return (outputs - torch.from_numpy(targets)).reshape(-1)
+every_activation = pytest.mark.parametrize("activation", ACTIVATIONS)
+every_trainer = pytest.mark.parametrize("trainer", TRAINERS)
 
 
-def dense(weights: Weights, activation: str, inputs, targets) -> tuple[np.ndarray, np.ndarray]:
-    """J (n * q, w) and e (n * q,) by automatic differentiation."""
-    vector = torch.from_numpy(flat(weights))
-    function = functools.partial(
-        residuals, weights=weights, activation=activation, inputs=inputs, targets=targets
-    )
-    return torch.autograd.functional.jacobian(function, vector).numpy(), function(vector).numpy()
+def minimise(start: Weights, problem: Problem, limits: Stopping) -> Minimum:
+    generator = np.random.default_rng(0)
+    return MODULES[type(limits)].minimise(start, problem, limits, generator)
 
 
-@pytest.mark.parametrize("activation", ACTIVATIONS)
-@pytest.mark.parametrize(("p", "q", "h"), [(3, 2, 4), (1, 1, 1), (2, 3, 5)])
-def test_normal_equations_against_autograd(activation, p, q, h):
-    case = problem(p=p, q=q, h=h, activation=activation)
-    jacobian, errors = dense(*case)
-    hessian, gradient = lm.normal_equations(*case)
-    np.testing.assert_allclose(hessian, jacobian.T @ jacobian, rtol=1e-11, atol=1e-12)
-    np.testing.assert_allclose(gradient, jacobian.T @ errors, rtol=1e-11, atol=1e-12)
-
-
-@pytest.mark.parametrize("activation", ACTIVATIONS)
-def test_gradient_against_central_differences(activation):
-    weights, *rest = problem(activation=activation)
-    _, gradient = lm.normal_equations(weights, *rest)
-    count = rest[2].size
-    length = 1e-6
-    for i in range(gradient.size):
-        shift = length * np.eye(gradient.size)[i]
-        above, below = (lm.mean_squared_error(weights.moved(s), *rest) for s in (shift, -shift))
-        # the gradient of the mean of the squares is 2 / count J^T e
-        numeric = (above - below) / (2.0 * length)
-        assert numeric == pytest.approx(2.0 / count * gradient[i], rel=1e-6, abs=1e-8)
-
-
-@pytest.mark.parametrize("activation", ACTIVATIONS)
-@pytest.mark.parametrize("mu", [1e-4, 1e-1, 1e3])
-def test_step_against_the_augmented_dense_system(activation, mu):
-    case = problem(activation=activation)
-    jacobian, errors = dense(*case)
-    n_weights = jacobian.shape[1]
-    # (J^T J + mu I) step = -J^T e is the least-squares solution of [J; sqrt(mu) I] step = [-e; 0]
-    augmented = np.vstack([jacobian, math.sqrt(mu) * np.eye(n_weights)])
-    expected = np.linalg.lstsq(augmented, np.append(-errors, np.zeros(n_weights)), rcond=None)[0]
-    step = lm.damped_step(*lm.normal_equations(*case), mu)
-    np.testing.assert_allclose(step, expected, rtol=1e-7, atol=1e-9 * np.abs(expected).max())
-
-
-def test_singular_system_has_no_step():
-    assert lm.damped_step(np.zeros((2, 2)), np.ones(2), 0.0) is None
-    assert lm.damped_step(np.diag([1.0, -1.0]), np.ones(2), 0.5) is None
-
-
-@pytest.mark.parametrize("chunk_length", [1, 7, 39, 40, 1000])
-def test_chunks_change_rounding_alone(chunk_length):
-    case = problem()
-    # the reference chunk holds all 40 samples
-    hessian, gradient = lm.normal_equations(*case, chunk_length=40)
-    chunked = lm.normal_equations(*case, chunk_length=chunk_length)
-    np.testing.assert_allclose(chunked[0], hessian, rtol=0, atol=1e-13 * np.abs(hessian).max())
-    np.testing.assert_allclose(chunked[1], gradient, rtol=0, atol=1e-13 * np.abs(gradient).max())
-    error = lm.mean_squared_error(*case, chunk_length=chunk_length)
-    assert error == pytest.approx(lm.mean_squared_error(*case, chunk_length=40), rel=1e-14)
-
-
-def test_training_does_not_depend_on_the_chunk_length(monkeypatch):
-    limits = LevenbergMarquardt(n_iterations=10)
-    whole = lm.minimise(*problem(), limits)
-    for name in ("normal_equations", "mean_squared_error"):
-        monkeypatch.setattr(lm, name, functools.partial(getattr(lm, name), chunk_length=7))
-    chunked = lm.minimise(*problem(), limits)
-    np.testing.assert_allclose(chunked.errors, whole.errors, rtol=1e-9)
-
-
-@given(st.integers(0, 2**31), st.sampled_from(ACTIVATIONS))
-@settings(max_examples=40, deadline=None)
-def test_the_error_falls_at_every_step(seed, activation):
-    case = problem(activation=activation, seed=seed)
-    minimum = lm.minimise(*case, LevenbergMarquardt(n_iterations=30))
+@given(
+    st.integers(0, 2**31),
+    st.sampled_from(ACTIVATIONS),
+    st.sampled_from(TRAINERS),
+    st.sampled_from(HIDDEN),
+)
+@settings(max_examples=60, deadline=None)
+def test_the_error_falls_at_every_step(seed, activation, trainer, hidden):
+    start, problem = some_problem(hidden=hidden, activation=activation, seed=seed)
+    minimum = minimise(start, problem, trainer(n_iterations=20))
     assert np.all(np.diff(minimum.errors) < 0.0)
-    assert minimum.errors[0] == lm.mean_squared_error(*case)
-    assert minimum.errors[-1] == lm.mean_squared_error(minimum.weights, *case[1:])
-
-
-@pytest.mark.parametrize("activation", ACTIVATIONS)
-def test_recovers_data_made_by_a_network(activation):
-    generator = np.random.default_rng(1)
-    teacher = lm.initial_weights(2, 3, 2, activation, generator)
-    inputs = generator.uniform(-1.0, 1.0, (200, 2))
-    targets = residuals(
-        torch.from_numpy(flat(teacher)), teacher, activation, inputs, np.zeros((200, 2))
+    assert minimum.errors[0] == problem.mean_squared_error(start)
+    assert minimum.errors[-1] == pytest.approx(
+        problem.mean_squared_error(minimum.weights), rel=1e-13
     )
-    targets = targets.numpy().reshape(200, 2)
-    errors = []
-    for seed in range(5):
-        start = lm.initial_weights(2, 3, 2, activation, np.random.default_rng(seed))
-        errors.append(lm.minimise(start, activation, inputs, targets, LevenbergMarquardt()).errors)
-    assert min(run[-1] for run in errors) < 1e-10
+    assert minimum.kept == len(minimum.errors) - 1
 
 
-@pytest.mark.parametrize("activation", ACTIVATIONS)
-def test_linear_data_is_fitted_closely(activation):
-    weights, _, inputs, _ = problem(activation=activation)
-    targets = inputs @ np.array([[0.3, -0.2], [0.1, 0.4], [-0.5, 0.2]]) + 0.1
-    limits = LevenbergMarquardt(minimum_gradient=0.0)
+@every_trainer
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_training_does_not_depend_on_the_chunk_length(trainer, hidden):
+    runs = [
+        minimise(*some_problem(hidden=hidden, chunk_length=length), trainer(n_iterations=10))
+        for length in (1000, 7)
+    ]
+    np.testing.assert_allclose(runs[1].errors, runs[0].errors, rtol=1e-9)
+
+
+@every_activation
+@every_trainer
+@pytest.mark.parametrize("hidden", [(3,), (3, 2)])
+def test_recovers_data_made_by_a_network(activation, trainer, hidden):
+    _, problem = taught(activation, seed=1, hidden=hidden)
+    starts = [
+        initial_weights(2, hidden, 2, activation, np.random.default_rng(seed)) for seed in range(5)
+    ]
+    limits = trainer(n_iterations=300, minimum_progress=0.0, goal=1e-12)
+    reached = [minimise(start, problem, limits).errors[-1] for start in starts]
+    assert min(reached) < 1e-10
+
+
+@every_activation
+@every_trainer
+def test_linear_data_is_fitted_closely(activation, trainer):
+    start, problem = some_problem(activation=activation)
+    mixing = np.array([[0.3, -0.2], [0.1, 0.4], [-0.5, 0.2]])
+    targets = np.ascontiguousarray((problem.inputs[:-1].T @ mixing + 0.1).T)
+    limits = trainer(minimum_gradient=0.0, n_iterations=500)
     # a straight line is the limit of ever smaller hidden weights, so 0 is approached, not met
-    assert lm.minimise(weights, activation, inputs, targets, limits).errors[-1] < 1e-9
+    assert minimise(start, replace(problem, targets=targets), limits).errors[-1] < 1e-8
 
 
-@pytest.mark.parametrize("activation", ACTIVATIONS)
+@every_activation
+@every_trainer
 @pytest.mark.parametrize("seed", range(3))
-def test_same_minimum_as_scipy_from_the_same_start(activation, seed):
+def test_same_minimum_as_scipy_from_the_same_start(activation, trainer, seed):
     # noise gives an error floor above 0; a start near the teacher puts both in one valley
-    generator = np.random.default_rng(seed)
-    teacher = lm.initial_weights(2, 3, 2, activation, generator)
-    inputs = generator.uniform(-1.0, 1.0, (80, 2))
-    vector = torch.from_numpy(flat(teacher))
-    clean = residuals(vector, teacher, activation, inputs, np.zeros((80, 2))).numpy()
-    targets = clean.reshape(80, 2) + 0.01 * generator.normal(size=(80, 2))
-    start = teacher.moved(0.05 * generator.normal(size=vector.numel()))
-
-    def errors(vector: np.ndarray) -> np.ndarray:
-        return residuals(torch.from_numpy(vector), start, activation, inputs, targets).numpy()
-
-    reference = least_squares(errors, flat(start), method="lm", xtol=1e-12, ftol=1e-12)
+    teacher, problem = taught(activation, seed, n=80, noise=0.01)
+    shift = np.random.default_rng(seed).normal(size=flatten(teacher).size)
+    start = moved(teacher, 0.05 * shift)
+    function = errors_function(start, problem)
+    reference = least_squares(
+        lambda vector: function(torch.from_numpy(vector)).numpy(),
+        flatten(start),
+        method="lm",
+        xtol=1e-12,
+        ftol=1e-12,
+    )
     assert reference.success
-    limits = LevenbergMarquardt(minimum_progress=0.0, minimum_gradient=1e-10)
-    minimum = lm.minimise(start, activation, inputs, targets, limits)
-    assert minimum.errors[-1] == pytest.approx(2.0 * reference.cost / targets.size, rel=1e-6)
+    minimum = minimise(start, problem, trainer(minimum_progress=0.0, minimum_gradient=1e-10))
+    assert minimum.errors[-1] == pytest.approx(
+        2.0 * reference.cost / problem.targets.size, rel=1e-6
+    )
 
 
-@pytest.mark.parametrize(("activation", "half_range"), [("tanh", 2.0), ("logistic", 4.0)])
-def test_initial_weights_are_nguyen_widrow(activation, half_range):
-    weights = lm.initial_weights(4, 14, 2, activation, np.random.default_rng(5))
-    assert weights.hidden.shape == (14, 5)
-    assert weights.output.shape == (2, 15)
-    magnitude = half_range * 0.7 * 14**0.25
-    np.testing.assert_allclose(np.linalg.norm(weights.hidden[:, :4], axis=1), magnitude)
-    spread = np.linspace(-magnitude, magnitude, 14) * np.sign(weights.hidden[:, 0])
-    np.testing.assert_allclose(weights.hidden[:, 4], spread)
-    assert np.all(np.abs(weights.output) <= 1.0)
+def plain_errors(vector: np.ndarray, start: Weights, problem: Problem) -> np.ndarray:
+    weights = unflatten(vector, start)
+    outputs = weights[-1] @ forward(weights, problem.activation, problem.inputs)[-1]
+    return (outputs - problem.targets).T.ravel()
 
 
-def test_every_limit_ends_the_run_with_its_reason():
-    def reason(**limits) -> StopReason:
-        return lm.minimise(*problem(), LevenbergMarquardt(**limits)).stop_reason
-
-    assert reason(n_iterations=3) is StopReason.ITERATIONS
-    assert reason(goal=0.1) is StopReason.GOAL
-    assert reason(minimum_gradient=1e3) is StopReason.GRADIENT
-    assert reason(minimum_progress=0.9, progress_window=5) is StopReason.PROGRESS
-    assert len(lm.minimise(*problem(), LevenbergMarquardt(n_iterations=3)).errors) == 4
-
-
-def test_the_gradient_limit_is_that_of_the_mean_squared_error():
-    case = problem()
-    jacobian, errors = dense(*case)
-    norm = 2.0 / case[3].size * np.linalg.norm(jacobian.T @ errors)
-    for factor, n_errors in [(1.001, 1), (0.999, 2)]:
-        limits = LevenbergMarquardt(n_iterations=1, minimum_gradient=factor * norm)
-        assert len(lm.minimise(*case, limits).errors) == n_errors
+def plain_jacobian(vector: np.ndarray, start: Weights, problem: Problem) -> np.ndarray:
+    weights, n_outputs = unflatten(vector, start), len(problem.targets)
+    layers = forward(weights, problem.activation, problem.inputs)
+    slopes = slopes_of(layers, problem.activation)
+    # derivative (n, q, units) of the outputs by the net inputs of a layer
+    derivative = np.tile(np.eye(n_outputs), (problem.inputs.shape[1], 1, 1))
+    columns = []
+    for k in range(len(weights) - 1, -1, -1):
+        block = derivative[:, :, :, None] * layers[k].T[:, None, None, :]
+        columns.append(block.reshape(len(derivative) * n_outputs, -1))
+        if k > 0:
+            derivative = derivative @ weights[k][:, :-1] * slopes[k - 1].T[:, None, :]
+    return np.hstack(columns[::-1])
 
 
-def test_mu_never_underflows(monkeypatch):
-    tried = []
-
-    def always_better(hessian, gradient, mu):
-        tried.append(mu)
-        return -1e-3 * gradient
-
-    monkeypatch.setattr(lm, "damped_step", always_better)
-    lm.minimise(*problem(), LevenbergMarquardt(n_iterations=6, mu_decrease=1e-100))
-    assert len(tried) == 6
-    assert min(tried) > 0.0
+@every_activation
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_the_jacobian_given_to_scipy_is_right(activation, hidden):
+    start, problem = some_problem(hidden=hidden, activation=activation)
+    found = plain_jacobian(flatten(start), start, problem)
+    np.testing.assert_allclose(found, dense(start, problem)[0], rtol=1e-11, atol=1e-13)
 
 
-def test_a_run_at_its_minimum_ends_by_mu_and_keeps_its_weights():
+@every_activation
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_accelerated_training_ends_no_worse_than_scipy_from_the_same_starts(activation, hidden):
+    ours, theirs = [], []
+    for seed in range(12):
+        start, problem = some_problem(n=60, p=2, hidden=hidden, activation=activation, seed=seed)
+
+        reference = least_squares(
+            functools.partial(plain_errors, start=start, problem=problem),
+            flatten(start),
+            functools.partial(plain_jacobian, start=start, problem=problem),
+            method="lm",
+            max_nfev=150,
+        )
+        theirs.append(2.0 * reference.cost / problem.targets.size)
+        limits = LevenbergMarquardtAccelerated(n_iterations=150, minimum_progress=0.0)
+        ours.append(minimise(start, problem, limits).errors[-1])
+    # one start may lead the two into different valleys, many do not
+    assert np.mean(np.log(ours)) <= np.mean(np.log(theirs))
+
+
+@every_activation
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_outputs_are_solved_exactly(activation, hidden):
+    start, problem = some_problem(hidden=hidden, activation=activation)
+    solved, error = with_solved_outputs(start, problem)
+    jacobian, errors = dense(start, problem)
+    output = jacobian[:, -start[-1].size :]
+    # the errors are linear in the output weights
+    change = np.linalg.lstsq(output, -errors, rcond=None)[0]
+    np.testing.assert_allclose(solved[-1].ravel(), start[-1].ravel() + change, rtol=1e-6, atol=1e-7)
+    assert error == pytest.approx(np.mean((errors + output @ change) ** 2), rel=1e-9)
+    assert error == pytest.approx(problem.mean_squared_error(solved), rel=1e-12)
+    for before, after in zip(start[:-1], solved[:-1], strict=True):
+        assert after is before
+
+
+def test_equal_hidden_units_are_no_obstacle():
+    start, problem = some_problem()
+    twins = (np.repeat(start[0][:2], 2, axis=0), start[1])
+    limits = LevenbergMarquardtAccelerated(n_iterations=20)
+    minimum = minimise(twins, problem, limits)
+    assert np.all(np.diff(minimum.errors) < 0.0)
+    assert len(minimum.errors) > 5
+
+
+@every_trainer
+def test_every_limit_ends_the_run_with_its_reason(trainer):
+    def run(**limits) -> Minimum:
+        return minimise(*some_problem(selection=True), trainer(**limits))
+
+    assert run(n_iterations=3).stop_reason is StopReason.ITERATIONS
+    assert len(run(n_iterations=3).errors) == 4
+    assert run(goal=0.1).stop_reason is StopReason.GOAL
+    assert run(minimum_gradient=1e3).stop_reason is StopReason.GRADIENT
+    assert run(minimum_progress=0.9, progress_window=5).stop_reason is StopReason.PROGRESS
+    assert run(maximum_seconds=1e-9).stop_reason is StopReason.TIME
+
+
+@every_trainer
+def test_the_gradient_limit_is_that_of_the_mean_squared_error(trainer):
+    start, problem = some_problem()
+    if trainer is LevenbergMarquardtAccelerated:
+        # so that solving the outputs moves nothing
+        start, _ = with_solved_outputs(start, problem)
+    norm = np.linalg.norm(problem.gradient(start)[1])
+    for factor, stopped in [(1.001, True), (0.999, False)]:
+        limits = trainer(n_iterations=2, minimum_gradient=factor * norm)
+        errors = minimise(start, problem, limits).errors
+        assert (errors[-1] > (1.0 - 1e-12) * errors[0]) == stopped
+
+
+@every_trainer
+def test_a_run_at_its_minimum_ends_by_mu_and_keeps_its_weights(trainer):
     # with every other limit off, rounding alone stops the fall of the error
-    weights, activation, inputs, targets = problem(n=12, p=1, q=1, h=1)
-    limits = LevenbergMarquardt(minimum_gradient=0.0, minimum_progress=0.0, n_iterations=10_000)
-    minimum = lm.minimise(weights, activation, inputs, targets, limits)
+    start, problem = some_problem(n=12, p=1, q=1, hidden=(1,))
+    limits = trainer(**UNLIMITED)
+    minimum = minimise(start, problem, limits)
     assert minimum.stop_reason is StopReason.MU
-    again = lm.minimise(minimum.weights, activation, inputs, targets, limits)
-    assert again.errors[-1] <= minimum.errors[-1] == again.errors[0]
+    again = minimise(minimum.weights, problem, limits)
+    assert again.errors[-1] <= again.errors[0]
+    assert again.errors[0] == pytest.approx(minimum.errors[-1], rel=1e-14)
 
 
-def test_a_singular_system_ends_the_run_and_keeps_the_weights(monkeypatch):
-    case = problem()
-    monkeypatch.setattr(lm, "damped_step", lambda *_: None)
-    minimum = lm.minimise(*case, LevenbergMarquardt())
+@every_trainer
+def test_a_singular_system_ends_the_run_and_keeps_the_weights(trainer, monkeypatch):
+    start, problem = some_problem()
+    monkeypatch.setattr(NormalEquations, "factor", lambda *_: None)
+    minimum = minimise(start, problem, trainer())
     assert minimum.stop_reason is StopReason.SINGULAR
-    assert minimum.weights is case[0]
+    assert minimum.weights[0] is start[0]
 
 
-def test_a_singular_factor_raises_mu(monkeypatch):
-    tried, original = [], lm.damped_step
+@every_trainer
+def test_a_singular_factor_raises_mu(trainer, monkeypatch):
+    tried, original = [], NormalEquations.factor
 
-    def fussy(hessian, gradient, mu):
+    def fussy(self, mu, *scale):
         tried.append(mu)
-        return original(hessian, gradient, mu) if mu >= 1.0 else None
+        return original(self, mu, *scale) if mu >= 1.0 else None
 
-    monkeypatch.setattr(lm, "damped_step", fussy)
-    minimum = lm.minimise(*problem(), LevenbergMarquardt(n_iterations=1))
-    np.testing.assert_allclose(tried[:4], [1e-3, 1e-2, 1e-1, 1.0])
-    assert minimum.errors[1] < minimum.errors[0]
-
-
-def test_a_trial_that_overflows_is_not_taken(monkeypatch):
-    original = lm.damped_step
-
-    def wild(hessian, gradient, mu):
-        step = original(hessian, gradient, mu)
-        return step * 1e200 if mu < 1.0 else step
-
-    monkeypatch.setattr(lm, "damped_step", wild)
-    minimum = lm.minimise(*problem(), LevenbergMarquardt(n_iterations=5))
+    monkeypatch.setattr(NormalEquations, "factor", fussy)
+    minimum = minimise(*some_problem(), trainer(n_iterations=2))
+    before = [mu for mu in tried if mu < 1.0]
+    assert before
+    assert before == sorted(before)
     assert np.all(np.diff(minimum.errors) < 0.0)
 
 
-def test_overflow_ends_the_run_without_a_bad_network():
-    weights, *rest = problem()
-    huge = Weights(weights.hidden, weights.output * 1e200)
-    minimum = lm.minimise(huge, *rest, LevenbergMarquardt())
+def test_mu_follows_the_rules_of_matlab(monkeypatch):
+    tried, original = [], NormalEquations.factor
+
+    def fussy(self, mu):
+        tried.append(mu)
+        return original(self, mu) if mu >= 1.0 else None
+
+    monkeypatch.setattr(NormalEquations, "factor", fussy)
+    minimise(*some_problem(), LevenbergMarquardt(n_iterations=1))
+    np.testing.assert_allclose(tried[:4], [1e-3, 1e-2, 1e-1, 1.0])
+
+
+@every_trainer
+def test_mu_never_underflows(trainer, monkeypatch):
+    tried, original = [], NormalEquations.factor
+
+    def recording(self, mu, *scale):
+        tried.append(mu)
+        return original(self, mu, *scale)
+
+    monkeypatch.setattr(NormalEquations, "factor", recording)
+    monkeypatch.setattr(accelerated, "_MU_DECREASE", 1e-100)
+    shrink = {"mu_decrease": 1e-100} if trainer is LevenbergMarquardt else {}
+    minimise(*some_problem(), trainer(n_iterations=6, **shrink))
+    assert len(tried) >= 5
+    assert min(tried) == 1e-20
+
+
+@every_trainer
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_overflow_ends_the_run_without_a_bad_network(trainer, hidden):
+    start, problem = some_problem(hidden=hidden)
+    huge = (*start[:-1], start[-1] * 1e200)
+    minimum = minimise(huge, problem, trainer())
     assert (minimum.stop_reason, minimum.errors) == (StopReason.NON_FINITE, ())
 
 
-def test_overflowing_derivatives_keep_the_weights(monkeypatch):
-    case = problem()
-    monkeypatch.setattr(lm, "normal_equations", lambda *_: (np.full((2, 2), np.inf), np.ones(2)))
-    minimum = lm.minimise(*case, LevenbergMarquardt())
+@every_trainer
+def test_overflowing_derivatives_keep_the_weights(trainer, monkeypatch):
+    start, problem = some_problem()
+
+    def overflowing(weights, problem):
+        equations = normal_equations(weights, problem)
+        return replace(equations, hidden=equations.hidden * np.inf)
+
+    monkeypatch.setattr(MODULES[trainer], "normal_equations", overflowing)
+    minimum = minimise(start, problem, trainer())
     assert minimum.stop_reason is StopReason.NON_FINITE
-    assert minimum.weights is case[0]
-    assert len(minimum.errors) == 1
+    assert minimum.weights[0] is start[0]
+    assert math.isfinite(minimum.errors[-1])
+
+
+@every_trainer
+def test_a_trial_that_overflows_is_not_taken(trainer, monkeypatch):
+    module, original, calls = MODULES[trainer], moved, []
+
+    def wild(weights, step):
+        calls.append(step)
+        return original(weights, step * (1e300 if len(calls) % 3 == 1 else 1.0))
+
+    monkeypatch.setattr(module, "moved", wild)
+    minimum = minimise(*some_problem(), trainer(n_iterations=5))
+    assert len(calls) > 5
+    assert np.all(np.diff(minimum.errors) < 0.0)
 
 
 @pytest.mark.parametrize(
-    ("name", "value"),
+    ("trainer", "name", "value"),
     [
-        ("n_iterations", 0),
-        ("mu", 0.0),
-        ("mu", math.nan),
-        ("mu_decrease", 1.5),
-        ("mu_increase", 1.0),
-        ("mu_maximum", 1e-4),
-        ("mu_maximum", math.inf),
-        ("goal", -1.0),
-        ("minimum_gradient", math.nan),
-        ("minimum_progress", 1.0),
-        ("progress_window", 0),
+        (LevenbergMarquardt, "mu", 0.0),
+        (LevenbergMarquardt, "mu", math.nan),
+        (LevenbergMarquardt, "mu_decrease", 1.5),
+        (LevenbergMarquardt, "mu_increase", 1.0),
+        (LevenbergMarquardt, "mu_maximum", 1e-4),
+        (LevenbergMarquardt, "mu_maximum", math.inf),
+        (LevenbergMarquardtAccelerated, "mu", 0.0),
+        (LevenbergMarquardtAccelerated, "mu_maximum", 1e-4),
+        (LevenbergMarquardtAccelerated, "acceleration", -0.1),
     ],
 )
-def test_settings_out_of_range_are_named(name, value):
+def test_settings_out_of_range_are_named(trainer, name, value):
     with pytest.raises(TrainingError, match=f"{name}={value}"):
-        LevenbergMarquardt(**{name: value})
+        trainer(**{name: value})

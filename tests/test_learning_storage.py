@@ -16,18 +16,17 @@ from flexik.learning.perceptron import Network, Quantity
 from flexik.learning.storage import load_network, save_network
 from flexik.learning.training import Architecture, TrainingRecord, train_best
 
-ARRAYS = ("hidden_weights", "hidden_bias", "output_weights", "output_bias")
 EXTREMES = ("minimum", "maximum")
 
 
-def trained() -> tuple[Network, TrainingRecord]:
+def trained(n_hidden: int | tuple[int, ...] = 3) -> tuple[Network, TrainingRecord]:
     generator = np.random.default_rng(0)
     inputs = generator.uniform(-1.0, 3.0, (60, 2))
     outputs = np.sin(inputs.sum(axis=1, keepdims=True))
     quantities = (Quantity("x", "m"), Quantity("Winkel α", "rad")), (Quantity("stroke", "m"),)
     data = inputs[:40], outputs[:40], inputs[40:], outputs[40:]
     limits = LevenbergMarquardt(n_iterations=5)
-    network, record, _ = train_best(*data, Architecture(3), limits, 5, 2, *quantities)
+    network, record, _ = train_best(*data, Architecture(n_hidden), limits, 5, 2, *quantities)
     return network, record
 
 
@@ -38,11 +37,13 @@ def saved(tmp_path):
     return path
 
 
-def test_round_trip_is_exact(saved):
-    network, record = trained()
-    loaded, loaded_record = load_network(saved, "abc")
-    for name in ARRAYS:
-        np.testing.assert_array_equal(getattr(loaded, name), getattr(network, name), strict=True)
+@pytest.mark.parametrize("n_hidden", [3, (3, 2)])
+def test_round_trip_is_exact(tmp_path, n_hidden):
+    network, record = trained(n_hidden)
+    save_network(tmp_path / "network.json", network, record, "abc")
+    loaded, loaded_record = load_network(tmp_path / "network.json", "abc")
+    for found, matrix in zip(loaded.weights, network.weights, strict=True):
+        np.testing.assert_array_equal(found, matrix, strict=True)
     for name in ("input_normalisation", "output_normalisation"):
         for extreme in EXTREMES:
             np.testing.assert_array_equal(
@@ -70,8 +71,9 @@ def test_retrained_and_resaved_files_are_identical(saved, tmp_path):
 def test_every_float64_survives(tmp_path_factory, bias):
     network, record = trained()
     path = tmp_path_factory.getbasetemp() / "float64.json"
-    save_network(path, replace(network, hidden_bias=bias), record, "")
-    assert load_network(path)[0].hidden_bias.tobytes() == bias.tobytes()
+    weights = np.column_stack([network.weights[0][:, :-1], bias])
+    save_network(path, replace(network, weights=(weights, network.weights[1])), record, "")
+    assert load_network(path)[0].weights[0].tobytes() == weights.tobytes()
 
 
 def test_no_selection_error_survives(tmp_path):
@@ -131,7 +133,7 @@ def edit(path, keys, function) -> None:
 def test_every_missing_or_mistyped_key_is_named(saved):
     original = saved.read_bytes()
     keys = list(every_key(json.loads(original)))
-    assert len(keys) == 30
+    assert len(keys) == 32
     for path in keys:
         for damage in (
             lambda inner, key: inner.pop(key),
@@ -147,25 +149,29 @@ def test_every_missing_or_mistyped_key_is_named(saved):
     ("keys", "value", "message"),
     [
         (("format",), "other", "format expected"),
-        (("version",), 2, "version expected 1"),
+        (("version",), 1, "version expected 2"),
         (("activation",), "relu", "activation is 'relu'"),
+        (("layers",), [], "layers holds 0, expected a hidden layer and the output layer"),
+        (("layers", 1), "x", r"layers\[1\] is not an object with weights and bias"),
         (
-            ("hidden_weights",),
+            ("layers", 0, "weights"),
             [[1.0, 2.0]],
-            r"hidden_weights has shape \(1, 2\), expected \(3, 2\)",
+            r"layers\[0\].weights has shape \(1, 2\), expected \(3, 2\)",
         ),
-        (("hidden_weights", 1), [1.0], "hidden_weights has rows of different lengths"),
-        (("hidden_weights", 1), [1.0, None], "hidden_weights holds something other"),
-        (("output_weights", 0), ["1.0", "2.0", "3.0"], "output_weights holds something other"),
-        (("hidden_bias",), [], "hidden_weights has shape"),
-        (("hidden_bias", 0), math.nan, "hidden_bias holds something other"),
-        (("output_bias", 0), math.inf, "output_bias holds something other"),
-        (("output_bias", 0), 10**400, "output_bias holds something other"),
+        (("layers", 0, "weights", 1), [1.0], r"layers\[0\].weights has rows of different lengths"),
+        (("layers", 0, "weights", 1), [1.0, None], r"layers\[0\].weights holds something other"),
+        (("layers", 1, "weights", 0), ["1.0"] * 3, r"layers\[1\].weights holds something other"),
+        (("layers", 0, "bias"), [], r"layers\[0\].weights has shape"),
+        (("layers", 1, "bias"), [1.0, 2.0], r"layers\[1\].bias has shape \(2,\), expected \(1,\)"),
+        (("layers", 0, "bias", 0), math.nan, r"layers\[0\].bias holds something other"),
+        (("layers", 1, "bias", 0), math.inf, r"layers\[1\].bias holds something other"),
+        (("layers", 1, "bias", 0), 10**400, r"layers\[1\].bias holds something other"),
         (("inputs",), [], "inputs is empty"),
         (("inputs", 1), "x", r"inputs\[1\] is not an object"),
         (("input_normalisation", "maximum"), [9.0, -9.0], "input_normalisation: .*minimum <="),
         (("output_normalisation", "minimum"), [1.0, 2.0], "output_normalisation.minimum has shape"),
         (("training", "stop_reason"), "tired", "training.stop_reason is 'tired'"),
+        (("training", "kept"), -1, "training.kept is -1"),
         (("training", "seed"), -1, "training.seed is -1"),
         (("training", "selection_error"), math.inf, "training.selection_error is not finite"),
         (("training", "errors", 0), math.nan, "training.errors holds something other"),
@@ -181,5 +187,10 @@ def test_a_network_that_is_not_finite_is_not_written(tmp_path):
     network, record = trained()
     path = tmp_path / "network.json"
     with pytest.raises(DataError, match=r"network\.json.*not finite"):
-        save_network(path, replace(network, output_bias=np.array([np.nan])), record, "abc")
+        save_network(
+            path,
+            replace(network, weights=tuple(w * np.nan for w in network.weights)),
+            record,
+            "abc",
+        )
     assert not list(tmp_path.iterdir())

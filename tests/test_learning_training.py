@@ -2,16 +2,28 @@
 
 import functools
 import pickle
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
+from threadpoolctl import threadpool_limits
 
 from flexik.errors import DataError, TrainingError
-from flexik.learning import levenberg_marquardt, training
-from flexik.learning.levenberg_marquardt import LevenbergMarquardt, StopReason
+from flexik.learning import training
 from flexik.learning.perceptron import Quantity
-from flexik.learning.training import Architecture, train, train_best
+from flexik.learning.training import (
+    TRAINERS,
+    Architecture,
+    LevenbergMarquardt,
+    Stopping,
+    StopReason,
+    train,
+    train_best,
+    trainer_settings,
+)
 
 INPUTS = (Quantity("x", "m"), Quantity("payload", "kg"))
 OUTPUTS = (Quantity("lift_stroke", "m"), Quantity("jib_stroke", "m"))
@@ -44,6 +56,11 @@ def process_map(function, items):
     for item in items:
         there = pickle.loads(pickle.dumps(function))
         yield pickle.loads(pickle.dumps(there(item)))
+
+
+def assert_same_weights(one, other) -> None:
+    for matrix, expected in zip(one.weights, other.weights, strict=True):
+        np.testing.assert_array_equal(matrix, expected, strict=True)
 
 
 def selection_error(network, inputs, outputs) -> float:
@@ -79,7 +96,7 @@ def test_record_holds_the_error_of_the_network():
 
 def test_same_seed_same_network_other_seed_another():
     runs = [train(*data(60), Architecture(4), QUICK, seed, INPUTS, OUTPUTS) for seed in (3, 3, 4)]
-    np.testing.assert_array_equal(runs[0][0].hidden_weights, runs[1][0].hidden_weights)
+    assert_same_weights(runs[0][0], runs[1][0])
     assert runs[0][1] == runs[1][1]
     assert runs[0][1].errors != runs[2][1].errors
 
@@ -105,8 +122,7 @@ def test_the_selection_error_chooses_not_the_training_error():
 @pytest.mark.parametrize("map_function", [reversed_map, process_map])
 def test_order_and_workers_do_not_matter(map_function):
     expected, result = best(), best(map_function)
-    for name in ("hidden_weights", "hidden_bias", "output_weights", "output_bias"):
-        np.testing.assert_array_equal(getattr(result[0], name), getattr(expected[0], name))
+    assert_same_weights(result[0], expected[0])
     assert result[1:] == expected[1:]
 
 
@@ -132,15 +148,15 @@ def overflowing(original, *restarts_to_break):
     def draw(*arguments):
         weights = original(*arguments)
         factor = 1e200 if next(draws) in restarts_to_break else 1.0
-        return replace(weights, output=weights.output * factor)
+        return (*weights[:-1], weights[-1] * factor)
 
     return draw
 
 
 def test_a_failed_restart_is_recorded_and_not_chosen(monkeypatch):
     winner = best()[1].restart
-    broken = overflowing(levenberg_marquardt.initial_weights, winner)
-    monkeypatch.setattr(levenberg_marquardt, "initial_weights", broken)
+    broken = overflowing(training.initial_weights, winner)
+    monkeypatch.setattr(training, "initial_weights", broken)
     _, record, records = best()
     assert record.restart != winner
     assert len(records) == 6
@@ -150,8 +166,8 @@ def test_a_failed_restart_is_recorded_and_not_chosen(monkeypatch):
 
 
 def test_no_usable_network_names_network_seed_and_reason(monkeypatch):
-    broken = overflowing(levenberg_marquardt.initial_weights, *range(100))
-    monkeypatch.setattr(levenberg_marquardt, "initial_weights", broken)
+    broken = overflowing(training.initial_weights, *range(100))
+    monkeypatch.setattr(training, "initial_weights", broken)
     message = r"lift_stroke, jib_stroke with 6 tanh units, seed 1: .*non_finite"
     with pytest.raises(TrainingError, match=message):
         best()
@@ -202,12 +218,18 @@ def test_more_weights_than_numbers_to_fit():
     start(*data(11), Architecture(4))
     with pytest.raises(TrainingError, match="4 hidden units have 22 weights, more than the 20"):
         start(*data(10), Architecture(4))
+    # 4 * 3 + 3 * 5 + 2 * 4 = 35 weights
+    start(*data(18), Architecture((4, 3)))
+    with pytest.raises(TrainingError, match="35 weights, more than the 34"):
+        start(*data(17), Architecture((4, 3)))
 
 
 @pytest.mark.parametrize(
     ("call", "message"),
     [
         (lambda: Architecture(0), "n_hidden=0"),
+        (lambda: Architecture((4, 0)), r"n_hidden=\(4, 0\)"),
+        (lambda: Architecture(()), r"n_hidden=\(\)"),
         (lambda: Architecture(3, "relu"), "activation='relu'"),
         (lambda: best(seed=-1), "seed=-1"),
         (lambda: best(n_restarts=0), "n_restarts=0"),
@@ -216,3 +238,131 @@ def test_more_weights_than_numbers_to_fit():
 def test_settings_out_of_range_are_named(call, message):
     with pytest.raises(TrainingError, match=message):
         call()
+
+
+EVERY_TRAINER = {
+    "levenberg_marquardt": {"n_iterations": 60},
+    "levenberg_marquardt_accelerated": {"n_iterations": 60},
+    "back_propagation": {"n_iterations": 40, "mode": "pattern"},
+    "adam": {"n_iterations": 200, "learning_rate": 0.02},
+    "lbfgs": {"n_iterations": 200},
+}
+every_trainer = pytest.mark.parametrize(("name", "options"), EVERY_TRAINER.items())
+
+
+def test_every_trainer_is_tried():
+    assert set(EVERY_TRAINER) == set(TRAINERS)
+
+
+@every_trainer
+@pytest.mark.parametrize("n_hidden", [6, (5, 4)])
+@pytest.mark.parametrize("activation", ["tanh", "logistic"])
+def test_every_trainer_learns_through_the_same_door(name, options, n_hidden, activation):
+    settings = trainer_settings(name, options)
+    arguments = (*data(150), Architecture(n_hidden, activation), settings, 0, INPUTS, OUTPUTS)
+    network, record = train(*arguments)
+    assert (record.trainer, network.n_hidden) == (name, n_hidden)
+    assert record.errors[record.kept] == min(record.errors)
+    # the targets' own mean square is about 0.2
+    assert record.errors[record.kept] < 0.04
+    again, record_again = train(*arguments)
+    assert_same_weights(again, network)
+    assert record_again == record
+
+
+@pytest.mark.parametrize("name", EVERY_TRAINER)
+def test_the_number_of_threads_and_processes_does_not_matter(name):
+    settings = trainer_settings(name, EVERY_TRAINER[name] | {"n_iterations": 10})
+    expected = best(settings=settings, n_restarts=2)
+    before = torch.get_num_threads()
+    try:
+        for n_threads in (1, 2):
+            torch.set_num_threads(n_threads)
+            with threadpool_limits(n_threads):
+                result = best(process_map, settings=settings, n_restarts=2)
+            assert_same_weights(result[0], expected[0])
+            assert result[1:] == expected[1:]
+            assert torch.get_num_threads() == n_threads
+    finally:
+        torch.set_num_threads(before)
+
+
+@pytest.mark.parametrize("name", EVERY_TRAINER)
+def test_selection_data_do_not_disturb_the_training(name):
+    settings = trainer_settings(name, EVERY_TRAINER[name] | {"n_iterations": 10})
+    arguments = (*data(60), Architecture(4), settings, 3, INPUTS, OUTPUTS)
+    _, plain = train(*arguments)
+    _, judged = train(*arguments, selection=data(25, seed=9))
+    patient = replace(settings, selection_patience=1000)
+    _, patient_record = train(
+        *data(60), Architecture(4), patient, 3, INPUTS, OUTPUTS, data(25, seed=9)
+    )
+    assert plain.errors == judged.errors == patient_record.errors
+    assert plain.selection_error is None
+    assert judged.selection_error > 0.0
+
+
+@pytest.mark.parametrize("name", ["levenberg_marquardt", "levenberg_marquardt_accelerated"])
+def test_patience_keeps_the_network_of_the_least_selection_error(name):
+    settings = trainer_settings(name, {"n_iterations": 100, "minimum_progress": 0.0})
+    patient = replace(settings, selection_patience=5)
+    noisy, selection = data(30, noise=0.1), data(200, seed=9)
+
+    def run(settings):
+        return train(*noisy, Architecture(6), settings, 1, INPUTS, OUTPUTS, selection)[1]
+
+    record, full = run(patient), run(settings)
+    assert record.stop_reason is StopReason.SELECTION
+    assert len(record.errors) - 1 - record.kept == 5
+    assert record.errors == full.errors[: len(record.errors)]
+    assert record.selection_error < full.selection_error
+    # the same as stopping there
+    stopped = run(replace(settings, n_iterations=max(record.kept, 1)))
+    assert record.selection_error == stopped.selection_error
+
+
+def test_patience_without_selection_data_is_refused():
+    patient = replace(QUICK, selection_patience=5)
+    with pytest.raises(TrainingError, match="selection_patience needs selection data"):
+        train(*data(60), Architecture(4), patient, 0, INPUTS, OUTPUTS)
+
+
+def test_settings_from_names():
+    settings = trainer_settings("levenberg_marquardt", {"n_iterations": 3, "mu": 1})
+    assert settings == LevenbergMarquardt(n_iterations=3, mu=1.0)
+    for name, trainer in TRAINERS.items():
+        assert type(trainer_settings(name)) is trainer.settings
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("newton", {}, "trainer 'newton' is unknown, expected one of levenberg_marquardt, "),
+        ("adam", {"mu": 1.0}, "trainer adam: option 'mu' is unknown, expected one of .*beta_1"),
+        ("adam", {"beta_1": 1.0}, "trainer adam: trainer setting beta_1=1.0 is out of range"),
+        ("lbfgs", {"n_iterations": 1.5}, "n_iterations=1.5, expected an integer"),
+        ("lbfgs", {"memory": True}, "memory=True, expected an integer"),
+        ("lbfgs", {"goal": "1e-3"}, "goal='1e-3', expected a number"),
+        ("lbfgs", {"maximum_seconds": "x"}, "maximum_seconds='x', expected a number or null"),
+        ("back_propagation", {"mode": "online"}, "mode=online is out of range"),
+        ("back_propagation", {"mode": None}, "mode=None, expected a name"),
+    ],
+)
+def test_bad_trainer_settings_are_named(name, options, message):
+    with pytest.raises(TrainingError, match=message):
+        trainer_settings(name, options)
+
+
+def test_settings_of_no_trainer_are_refused():
+    with pytest.raises(TrainingError, match="Stopping is not the settings of a trainer"):
+        train(*data(60), Architecture(4), Stopping(), 0, INPUTS, OUTPUTS)
+
+
+def test_levenberg_marquardt_does_not_import_torch():
+    code = (
+        "import sys, numpy as np; from flexik.learning import training as t; "
+        "from flexik.learning.perceptron import Quantity as Q; x = np.linspace(0, 1, 40)[:, None]; "
+        "t.train(x, np.sin(x), t.Architecture(2), t.LevenbergMarquardtAccelerated(), 0, "
+        "[Q('x', 'm')], [Q('y', 'm')]); assert 'torch' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -184,7 +184,9 @@ def test_an_increment_that_does_not_divide_is_told(original):
 
 def test_a_missing_network_lists_those_there_are(original):
     text = mistake(changed(original, "crane.methods.combined_ga.network", "nothing"))
-    assert "crane.methods.combined_ga.network" in text and "(deflection)" in text
+    assert (
+        "crane.methods.combined_ga.network" in text and "(deflection, deflection_selected)" in text
+    )
 
 
 def test_a_method_may_not_take_the_name_of_the_uncompensated_crane(original):

@@ -133,6 +133,10 @@ def test_positioning_errors_stand_beside_the_published_ones(published):
         "",
         "",
     ]
+    table = positioning_errors_table({"mine": OURS}, published, {"mine": None})
+    assert table["mine"].tolist()[5] == pytest.approx(30.0)
+    row = next(line for line in markdown(table).splitlines() if "mean R" in line)
+    assert [cell.strip() for cell in row.split("|")] == ["", "mean R (mm)", "30.00", "", ""]
     less = {key: value for key, value in OURS.items() if key != "n_failed"}
     with pytest.raises(DataError, match="n_failed"):
         positioning_errors_table({"none": less}, published)

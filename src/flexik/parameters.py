@@ -17,6 +17,12 @@ from flexik.files import checksum
 
 PARAMETERS_FILE = "params.yaml"
 
+# Lengths closer than this are the same, m
+LENGTH_TOLERANCE = 1e-9
+
+# Prefixes of metrics, a method of its own, and names that DVC's run cache ignores
+TAKEN_NAMES = ("none", "grid", "selection", "select", "calibration", "size", "nfiles")
+
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Count = Annotated[int, Field(ge=1)]
@@ -41,7 +47,9 @@ class Model(BaseModel):
         if isinstance(data, dict):
             for key, value in data.items():
                 for entry in _entries(value):
-                    if isinstance(entry, bool) or (isinstance(entry, str) and _is_number(entry)):
+                    if isinstance(entry, bool):
+                        raise ValueError(f"{key}: expected no truth value, got {entry!r}")
+                    if isinstance(entry, str) and _is_number(entry):
                         raise ValueError(
                             f"{key}: {entry!r} is no YAML number (write 1.0e-5, 1.0e+6)"
                         )
@@ -117,8 +125,6 @@ class Structure(Model):
     gravity: Positive
     lift_axis_height: float
     jib_axis_height: float
-    extension_overlap: Positive
-    front_pad: Positive
     beams: Beams
     rocker: RodModel
     coupler: RodModel
@@ -127,7 +133,6 @@ class Structure(Model):
 class Calibration(Model):
     """Fit of the ground spring."""
 
-    published_mean_error: Positive
     stiffness_range: tuple[Positive, Positive]
 
     @model_validator(mode="after")
@@ -260,6 +265,13 @@ class Lbfgs(Stopping):
     memory: Count
 
 
+TRAINER_KINDS = (
+    "levenberg_marquardt",
+    "levenberg_marquardt_accelerated",
+    "back_propagation",
+    "adam",
+    "lbfgs",
+)
 Trainer = Annotated[
     LevenbergMarquardt | LevenbergMarquardtAccelerated | BackPropagation | Adam | Lbfgs,
     Field(discriminator="kind"),
@@ -365,28 +377,62 @@ class Crane(Model):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        self._check_lengths()
+        self._check_strokes()
+        self._check_names()
+        return self
+
+    def _check_lengths(self) -> None:
+        """What the geometry and the beams both say must agree."""
+        geometry, beams = self.geometry, self.structure.beams
+        expected = {
+            "pillar.span.1": (beams.pillar.span[1], geometry.lift_pivot[1], "lift_pivot"),
+            "lift.span.0": (beams.lift.span[0], 0.0, "the lift pivot"),
+            "lift.span.1": (beams.lift.span[1], geometry.jib_pivot[0], "jib_pivot"),
+            "extension.span.0": (beams.extension.span[0], 0.0, "its rear end"),
+        }
+        for key, (found, value, why) in expected.items():
+            if abs(found - value) > LENGTH_TOLERANCE:
+                raise ValueError(f"structure.beams.{key}: expected {value:g} m ({why})")
+        tip = geometry.coupler_pin[0] + geometry.extension_start[0] + geometry.stroke_maximum[2]
+        rear_pad = tip - beams.extension.span[1]
+        if rear_pad >= beams.jib.span[1]:
+            raise ValueError(
+                f"geometry.stroke_maximum.2: the rear pad, at {rear_pad:g} m, would leave the jib"
+            )
+        lengths = {"rocker": geometry.rocker_length, "coupler": geometry.coupler_length}
+        for name, length in lengths.items():
+            if getattr(self.structure, name).centre_of_mass > length:
+                raise ValueError(f"structure.{name}.centre_of_mass: beyond its length, {length} m")
+
+    def _check_strokes(self) -> None:
         reach = dict(zip(("lift", "jib", "extension"), self.geometry.stroke_maximum, strict=True))
         for name, longest in reach.items():
-            if getattr(self.grid, name).maximum > longest + 1e-9:
+            if getattr(self.grid, name).maximum > longest + LENGTH_TOLERANCE:
                 raise ValueError(f"grid.{name}.maximum: lies beyond the cylinder, {longest} m")
         for stroke, (name, longest) in zip(self.illustration.strokes, reach.items(), strict=True):
             if stroke > longest:
                 raise ValueError(f"illustration.strokes: {name} beyond the cylinder, {longest} m")
-        if "none" in self.methods:
-            raise ValueError("methods.none: the name is taken by the uncompensated crane")
+
+    def _check_names(self) -> None:
+        for section in ("networks", "selected_networks", "methods"):
+            for label in getattr(self, section):
+                if label in TAKEN_NAMES:
+                    raise ValueError(f"{section}.{label}: the name is taken")
+        for label in self.selected_networks:
+            if label in self.networks:
+                raise ValueError(f"selected_networks.{label}: there is such a name under networks")
         for label, method in self.methods.items():
             if self.any_network(method.network) is None:
                 known = ", ".join([*self.networks, *self.selected_networks])
                 raise ValueError(
                     f"methods.{label}.network: there is no network {method.network!r} ({known})"
                 )
-        for label in self.selected_networks:
-            if label in self.networks:
-                raise ValueError(f"selected_networks.{label}: there is such a name under networks")
-        for number, target in enumerate(self.evaluation.points):
-            if target in self.evaluation.points[:number]:
-                raise ValueError(f"evaluation.points.{number}: {target} is there twice")
-        return self
+        for name in ("points", "payloads"):
+            values = getattr(self.evaluation, name)
+            for number, value in enumerate(values):
+                if value in values[:number]:
+                    raise ValueError(f"evaluation.{name}.{number}: {value} is there twice")
 
 
 class Parameters(Model):
@@ -430,7 +476,14 @@ def validate(data: dict[str, Any], source: str = PARAMETERS_FILE) -> Parameters:
     except ValidationError as error:
         lines = []
         for detail in error.errors():
-            key = ".".join(str(part) for part in detail["loc"]) or "top level"
+            parts = [str(part) for part in detail["loc"]]
+            # the tag of a trainer's kind is no key
+            parts = [
+                part
+                for part, before in zip(parts, ["", *parts], strict=False)
+                if before != "trainer" or part not in TRAINER_KINDS
+            ]
+            key = ".".join(parts) or "top level"
             message = detail["msg"].removeprefix("Value error, ")
             if detail["type"] == "value_error":  # our own: "key within the section: what is wrong"
                 within, _, message = message.partition(": ")

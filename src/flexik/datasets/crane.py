@@ -117,7 +117,7 @@ def random_samples(
             break
     else:
         raise ParameterError(
-            f"minimum_tip_x: hardly any pose has its tip at x >= {minimum_tip_x} m"
+            f"crane.grid.minimum_tip_x: hardly any pose has its tip at x >= {minimum_tip_x} m"
         )
     return Samples(strokes[:n_samples], rng.uniform(*payload, n_samples))
 
@@ -131,7 +131,8 @@ def split(samples: Samples, n_rows: int = 100) -> list[Samples]:
 def solve_samples(crane: FlexibleCrane, minimum_tip_x: float, samples: Samples) -> dict[str, Array]:
     """Columns FIELDS of `samples`; one that is left out or fails is a row with its status."""
     rigid = forward(crane.geometry, samples.strokes)
-    kept = rigid[:, 0] >= minimum_tip_x
+    # a linkage that does not close has no rigid tip: that fails, it is not left out
+    kept = ~(rigid[:, 0] < minimum_tip_x)
     tips = np.full((len(samples), 2), np.nan)
     status = np.where(kept, KEPT, LEFT_OUT)
     rows = np.flatnonzero(kept)

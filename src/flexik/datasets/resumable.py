@@ -5,9 +5,12 @@ folder is apart from the output, because DVC deletes a stage's outputs before ru
 """
 
 import contextlib
+import fcntl
+import os
 import re
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -75,6 +78,33 @@ def compute_table(
         Whatever `function` raises. Finished parts are kept.
     """
     path, folder = Path(path), Path(folder)
+    with _sole_run(folder):
+        return _compute(
+            path,
+            function,
+            parts,
+            fields,
+            parameters_checksum,
+            key,
+            settings,
+            description,
+            folder,
+            metadata,
+        )
+
+
+def _compute(
+    path: Path,
+    function: Callable[[T], Mapping[str, np.ndarray]],
+    parts: Sequence[T],
+    fields: Sequence[Field],
+    parameters_checksum: str,
+    key: str,
+    settings: ParallelSettings,
+    description: str,
+    folder: Path,
+    metadata: Mapping[str, str] | None,
+) -> int:
     files = _part_files(folder, key, len(parts))
     missing = [
         i
@@ -89,6 +119,27 @@ def compute_table(
     concatenate_tables(files, path, fields, parameters_checksum, metadata)
     _clean(path, folder)
     return len(parts) - len(missing)
+
+
+@contextlib.contextmanager
+def _sole_run(folder: Path) -> Iterator[None]:
+    """Wait for another run on `folder`: killing DVC may leave its stage at work."""
+    file = folder.with_name(f"{folder.name}.lock")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    while True:
+        with file.open("w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                print(f"waiting for another run on {folder}", file=sys.stderr)
+                fcntl.flock(lock, fcntl.LOCK_EX)
+            if os.fstat(lock.fileno()).st_nlink == 0:
+                continue  # the other run has removed this file: it locks nothing any more
+            try:
+                yield
+            finally:
+                file.unlink(missing_ok=True)
+            return
 
 
 def _part_files(folder: Path, key: str, n_parts: int) -> list[Path]:

@@ -206,6 +206,18 @@ def _write_rows(path: Path | str, schema: pa.Schema, tables: Iterable[pa.Table])
             writer.write_table(rows, row_group_size=ROWS_PER_GROUP)
 
 
+def read_csv(path: Path | str, columns: Sequence[str]) -> pd.DataFrame:
+    """CSV table `path` with at least `columns`; raises DataError if it is missing or damaged."""
+    try:
+        table = pd.read_csv(path)
+    except (OSError, ValueError) as error:
+        reason = " ".join(str(error).split())
+        raise DataError(f"{path}: expected a CSV table ({reason})") from None
+    if missing := [name for name in columns if name not in table]:
+        raise DataError(f"{path}: expected columns {list(columns)}, but {missing} missing")
+    return table
+
+
 @contextlib.contextmanager
 def _open(path: Path | str) -> Iterator[pq.ParquetFile]:
     """Open `path`; whatever Arrow dislikes while it is open becomes a DataError."""

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
-from flexik.errors import ParameterError
+from flexik.errors import ParameterError, SolverError
 from flexik.evaluation.errors import statistics
 
 
@@ -45,7 +45,10 @@ def fit_spring(
         return statistics(uncompensated(float(np.exp(log_stiffness))))["mean_error"] - mean_error
 
     low, high = np.log(stiffness_range)
-    ends = excess(low), excess(high)
+    try:
+        ends = excess(low), excess(high)
+    except SolverError as error:
+        raise ParameterError(f"crane.calibration.stiffness_range: at its ends {error}") from None
     if ends[0] * ends[1] > 0:
         found = " and ".join(f"{1e3 * (mean_error + end):.2f} mm" for end in ends)
         raise ParameterError(

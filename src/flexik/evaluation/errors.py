@@ -96,7 +96,7 @@ def statistics(frame: pd.DataFrame) -> dict[str, float]:
 def comparison(
     by_method: Mapping[str, Mapping[str, float]],
     published: pd.DataFrame,
-    column_of: Mapping[str, str] | None = None,
+    column_of: Mapping[str, str | None] | None = None,
 ) -> pd.DataFrame:
     """STATISTICS of methods beside the published ones, in mm.
 
@@ -108,12 +108,13 @@ def comparison(
         A column `statistic` and a column (mm) for every published method.
     column_of
         Published column of a label where it is not the label itself, as for two variants of one
-        method.
+        method; None where nothing is published.
 
     Returns
     -------
     DataFrame
-        Rows STATISTICS; columns `label` and `label published` for every label.
+        Rows STATISTICS; columns `label` and `label published`, NaN where nothing is published, for
+        every label.
 
     Raises
     ------
@@ -126,8 +127,12 @@ def comparison(
     columns = {}
     for label, values in by_method.items():
         column = (column_of or {}).get(label, label)
-        if column not in table.columns:
+        if column is not None and column not in table.columns:
             raise DataError(f"published errors: no column {column!r}, found {list(table.columns)}")
         columns[label] = [1e3 * values[name] for name in STATISTICS]
-        columns[f"{label} published"] = table.loc[list(STATISTICS), column].tolist()
+        columns[f"{label} published"] = (
+            [np.nan] * len(STATISTICS)
+            if column is None
+            else table.loc[list(STATISTICS), column].tolist()
+        )
     return pd.DataFrame(columns, index=pd.Index(list(STATISTICS), name="statistic"))

@@ -10,21 +10,21 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg.lapack import dpotrs
 
 from flexik.learning.levenberg_marquardt import MU_MINIMUM
-from flexik.learning.normal_equations import NormalEquations, normal_equations
+from flexik.learning.normal_equations import NormalEquations, cholesky, normal_equations
 from flexik.learning.perceptron import Array
 from flexik.learning.problem import Problem
 from flexik.learning.stopping import Minimum, Monitor, Stopping, StopReason
-from flexik.learning.weights import Weights, forward, moved, unflatten
+from flexik.learning.weights import Weights, moved, unflatten
 
 # share of the largest diagonal element by which every weight is damped at least
 _SCALE_FLOOR = 1e-3
 # keeps the system of the output layer regular when hidden units agree; relative to its diagonal
 _RIDGE = 1e-10
 # mu falls by this factor at most in one step
-_MU_DECREASE = 0.1
+_MU_DECREASE = 0.2
 
 
 @dataclass(frozen=True)
@@ -90,11 +90,10 @@ def minimise(
     error = problem.mean_squared_error(start)
     if (reason := monitor.add(start, error)) is not None:
         return monitor.result(reason)
-    point = _Point(start, normal_equations(start, problem))
     solved, _error = with_solved_outputs(start, problem)
     if (better := _point_below(error, solved, problem)) is not None:
-        point = better
         reason = monitor.add(solved, better.equations.mean_squared_error)
+    point = better or _Point(start, normal_equations(start, problem))
     damping = _Damping(settings.mu)
     while reason is None:
         found = _descend(point, problem, settings, damping)
@@ -167,22 +166,16 @@ def with_solved_outputs(weights: Weights, problem: Problem) -> tuple[Weights, fl
     change of the output layer, so the ridge that guards the system leaves no bias.
     """
     q, k = weights[-1].shape
-    rows = np.empty((k + q, min(problem.chunk_length, problem.targets.shape[1])))
-    gram = np.zeros((k + q, k + q))
+    system, right, error = np.zeros((k, k)), np.zeros((k, q)), 0.0
     with np.errstate(over="ignore", invalid="ignore"):
-        for inputs, targets in problem.chunks():
-            block = rows[:, : inputs.shape[1]]
-            _, outputs = forward(weights, problem.activation, inputs, last=block[:k])
-            np.subtract(outputs, targets, out=block[k:])
-            gram += block @ block.T
-        error = float(np.trace(gram[k:, k:]))
-        system, right = gram[:k, :k], gram[:k, k:]
-        guarded = system.copy()
-        guarded.flat[:: k + 1] += _RIDGE * np.trace(system) / k
-        try:
-            factor = cho_factor(guarded, lower=True, overwrite_a=True, check_finite=False)
-        except LinAlgError:
+        for chunk in problem.chunks(weights):
+            last, errors = chunk.layers[-1], chunk.errors(weights)
+            system += last @ last.T
+            right += last @ errors.T
+            error += float(np.vdot(errors, errors))
+        factor = cholesky(system, _RIDGE * np.trace(system) / k)
+        if factor is None:
             return weights, error / problem.targets.size
-        change = -cho_solve(factor, right, check_finite=False)
+        change = -dpotrs(factor, right, lower=1)[0]
         error += float(np.vdot(change, 2.0 * right + system @ change))
     return (*weights[:-1], weights[-1] + change.T), error / problem.targets.size

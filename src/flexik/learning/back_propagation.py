@@ -105,8 +105,8 @@ def _pattern_pass(
     with np.errstate(over="ignore", invalid="ignore"):
         for sample in generator.permutation(problem.targets.shape[1]):
             one = slice(sample, sample + 1)
-            layers, errors = forward(current, problem.activation, problem.inputs[:, one])
-            errors -= problem.targets[:, one]
+            layers = forward(current, problem.activation, problem.inputs[:, one])
+            errors = current[-1] @ layers[-1] - problem.targets[:, one]
             gradient = backward(current, layers, slopes_of(layers, problem.activation), errors)
             step = settings.momentum * step - rate * gradient
             vector += step

@@ -6,11 +6,11 @@ Source: Rouvinen 1999, equations 55 and 56; Hagan and Menhaj 1994.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve, solve_triangular
+from scipy.linalg.lapack import dpotrf, dpotrs, dtrtrs
 
-from flexik.learning.perceptron import Array, slope
+from flexik.learning.perceptron import Array
 from flexik.learning.problem import Problem
-from flexik.learning.weights import Weights, forward, slopes_of
+from flexik.learning.weights import Weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,18 +59,14 @@ class NormalEquations:
         """
         q, k, m = self.mixed.shape
         d_hidden, d_output = (1.0, 1.0) if scale is None else scale
-        try:
-            damped = _damped(self.output, mu * d_output)
-            output, _ = cho_factor(damped, lower=True, overwrite_a=True, check_finite=False)
-            columns = self.mixed.transpose(1, 0, 2).reshape(k, q * m)
-            coupling = solve_triangular(output, columns, lower=True, check_finite=False)
-            coupling = coupling.reshape(k, q, m).transpose(1, 0, 2).reshape(q * k, m)
-            schur = _damped(self.hidden, mu * d_hidden)
-            schur -= coupling.T @ coupling
-            hidden, _ = cho_factor(schur, lower=True, overwrite_a=True, check_finite=False)
-        except LinAlgError:
+        output = cholesky(self.output, mu * d_output)
+        if output is None:
             return None
-        return DampedFactor(output, coupling, hidden)
+        columns = self.mixed.transpose(1, 0, 2).reshape(k, q * m)
+        coupling = dtrtrs(output, columns, lower=1)[0]
+        coupling = coupling.reshape(k, q, m).transpose(1, 0, 2).reshape(q * k, m)
+        hidden = cholesky(self.hidden - coupling.T @ coupling, mu * d_hidden)
+        return None if hidden is None else DampedFactor(output, coupling, hidden)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,11 +81,11 @@ class DampedFactor:
         """(J^T J + mu D)^-1 vector, both (w,)."""
         k, m = len(self.output), len(self.hidden)
         right = vector[m:].reshape(-1, k).T
-        reduced = solve_triangular(self.output, right, lower=True, check_finite=False)
+        reduced = dtrtrs(self.output, right, lower=1)[0]
         remaining = vector[:m] - reduced.T.ravel() @ self.coupling
-        hidden = cho_solve((self.hidden, True), remaining, check_finite=False)
+        hidden = dpotrs(self.hidden, remaining, lower=1)[0]
         reduced = reduced - (self.coupling @ hidden).reshape(-1, k).T
-        output = solve_triangular(self.output, reduced, lower=True, trans=1, check_finite=False)
+        output = dtrtrs(self.output, reduced, lower=1, trans=1)[0]
         return np.concatenate([hidden, output.T.ravel()])
 
 
@@ -110,12 +106,11 @@ def _one_hidden_layer(weights: Weights, problem: Problem) -> NormalEquations:
     # a view: first the contiguous buffer is cut into (h, p + 1, c), then to the chunk
     products = rows[:m].reshape(h, n_columns, -1)
     gram = np.zeros((m + k + q, m + k + q))
-    for inputs, targets in problem.chunks():
-        c = inputs.shape[1]
-        layers, outputs = forward(weights, problem.activation, inputs, last=rows[m : m + k, :c])
-        slopes = slope(layers[1][:-1], problem.activation)
-        np.multiply(slopes[:, None, :], inputs[None, :, :], out=products[:, :, :c])
-        np.subtract(outputs, targets, out=rows[m + k :, :c])
+    for chunk in problem.chunks(weights):
+        c = chunk.inputs.shape[1]
+        np.multiply(chunk.slopes[0][:, None, :], chunk.inputs, out=products[:, :, :c])
+        rows[m : m + k, :c] = chunk.layers[1]
+        rows[m + k :, :c] = chunk.errors(weights)
         gram += rows[:, :c] @ rows[:, :c].T
     coupling = np.repeat(weights[1][:, :-1], n_columns, axis=1)
     hidden = gram[:m, :m] * (coupling.T @ coupling)
@@ -130,10 +125,10 @@ def _any_layers(weights: Weights, problem: Problem) -> NormalEquations:
     m, k, q = sum(w.size for w in weights[:-1]), weights[-1].shape[1], len(weights[-1])
     rows = np.empty((m + k + 1, min(problem.chunk_length, problem.targets.shape[1])))
     grams = np.zeros((q, m + k + 1, m + k + 1))
-    for inputs, targets in problem.chunks():
-        block = rows[:, : inputs.shape[1]]
-        layers, outputs = forward(weights, problem.activation, inputs, last=block[m : m + k])
-        slopes = slopes_of(layers, problem.activation)
+    for chunk in problem.chunks(weights):
+        block, errors = rows[:, : chunk.inputs.shape[1]], chunk.errors(weights)
+        layers, slopes = chunk.layers, chunk.slopes
+        block[m : m + k] = layers[-1]
         for unit in range(q):
             # derivative of this output by the net inputs of a layer, from the last layer down
             derivative, end = weights[-1][unit, :-1, None] * slopes[-1], m
@@ -144,7 +139,7 @@ def _any_layers(weights: Weights, problem: Problem) -> NormalEquations:
                 if layer > 0:
                     derivative = (weights[layer][:, :-1].T @ derivative) * slopes[layer - 1]
                 end = start
-            np.subtract(outputs[unit], targets[unit], out=block[-1])
+            block[-1] = errors[unit]
             grams[unit] += block @ block.T
     gradient = np.concatenate([grams[:, -1, :m].sum(axis=0), grams[:, -1, m:-1].ravel()])
     error = float(grams[:, -1, -1].sum()) / problem.targets.size
@@ -152,7 +147,13 @@ def _any_layers(weights: Weights, problem: Problem) -> NormalEquations:
     return NormalEquations(hidden, mixed, grams[0, m:-1, m:-1].copy(), gradient, error)
 
 
-def _damped(block: Array, damping: Array | float) -> Array:
-    damped = block.copy()
-    damped.flat[:: len(damped) + 1] += damping
-    return damped
+def cholesky(matrix: Array, damping: Array | float) -> Array | None:
+    """Lower factor of the symmetric `matrix` + diag(`damping`), or None when there is none.
+
+    LAPACK is called without SciPy's checks, which cost as much as the work on small matrices.
+    """
+    damped = np.array(matrix, order="F")
+    np.einsum("ii->i", damped)[:] += damping
+    factor, info = dpotrf(damped, lower=1, clean=0, overwrite_a=1)
+    # nan passes through some builds of LAPACK
+    return factor if info == 0 and np.isfinite(factor[-1, -1]) else None

@@ -30,7 +30,11 @@ def activate(net_input: Array, activation: str, out: Array | None = None) -> Arr
 
 def slope(hidden: Array, activation: str) -> Array:
     """Return the derivative of the activation, told by its own output `hidden`."""
-    return 1.0 - hidden * hidden if activation == "tanh" else hidden * (1.0 - hidden)
+    if activation == "tanh":
+        square = hidden * hidden
+        return np.subtract(1.0, square, out=square)
+    rest = 1.0 - hidden
+    return np.multiply(hidden, rest, out=rest)
 
 
 def bend(hidden: Array, activation: str) -> Array:

@@ -1,15 +1,46 @@
 """What a trainer minimises: the mean squared error of a perceptron on normalised data."""
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from flexik.learning.perceptron import Array
 from flexik.learning.weights import Weights, backward, forward, second_derivative, slopes_of
 
-# samples in work at once: bounds memory, and longer chunks are no faster
-CHUNK_LENGTH = 1024
+# samples in work at once, at most: bounds memory, and longer chunks leave the cache
+CHUNK_LENGTH = 1280
+# values of hidden layers that are remembered from one pass to the next, 32 MB
+_REMEMBERED = 4_000_000
+
+
+@dataclass(eq=False)
+class Chunk:
+    """Some of the samples, and the hidden layers' outputs for them.
+
+    Attributes
+    ----------
+    inputs, targets : (p + 1, c) and (q, c)
+    layers : of `weights.forward`
+    """
+
+    inputs: Array
+    targets: Array
+    layers: list[Array]
+    activation: str
+
+    @cached_property
+    def slopes(self) -> list[Array]:
+        """Derivative (units, c) of the activation in every hidden layer."""
+        return slopes_of(self.layers, self.activation)
+
+    def errors(self, weights: Weights) -> Array:
+        """Outputs minus targets (q, c)."""
+        errors = weights[-1] @ self.layers[-1]
+        errors -= self.targets
+        return errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +53,7 @@ class Problem:
     inputs : (p + 1, n), normalised, the last row 1
     targets : (q, n), normalised
     selection : inputs and targets of the same form the training does not see, if any
-    chunk_length : samples in work at once; changes rounding alone
+    chunk_length : samples in work at once, at most; changes rounding alone
     """
 
     activation: str
@@ -30,44 +61,64 @@ class Problem:
     targets: Array
     selection: tuple[Array, Array] | None = None
     chunk_length: int = CHUNK_LENGTH
+    # the last hidden weights and their chunks, or nothing
+    _memory: list[tuple[Weights, list[Chunk]]] = field(default_factory=list, init=False, repr=False)
 
-    def chunks(self) -> Iterator[tuple[Array, Array]]:
-        """Inputs (p + 1, c) and targets (q, c), chunk by chunk."""
-        return _chunks(self.inputs, self.targets, self.chunk_length)
+    def chunks(self, weights: Weights) -> Iterator[Chunk]:
+        """All samples, chunk by chunk; trainers ask for the same hidden weights several times."""
+        hidden = weights[:-1]
+        for known, chunks in self._memory:
+            if all(one is other for one, other in zip(known, hidden, strict=True)):
+                yield from chunks
+                return
+        size = self.targets.shape[1] * sum(len(matrix) for matrix in hidden)
+        passed = []
+        for chunk in self._new_chunks(weights, self.inputs, self.targets):
+            yield chunk
+            if size <= _REMEMBERED:
+                passed.append(chunk)
+        if passed:
+            self._memory[:] = [(hidden, passed)]
 
     def mean_squared_error(self, weights: Weights) -> float:
         """Mean of the squared errors over samples and outputs; inf or nan when it overflows."""
-        return _mean_squared_error(weights, self.activation, self.chunks()) / self.targets.size
+        return _sum_of_squares(weights, self.chunks(weights)) / self.targets.size
 
     def selection_error(self, weights: Weights) -> float:
         """The same on the selection data; nan when there are none."""
         if self.selection is None:
             return np.nan
-        chunks = _chunks(*self.selection, self.chunk_length)
-        return _mean_squared_error(weights, self.activation, chunks) / self.selection[1].size
+        chunks = self._new_chunks(weights, *self.selection)
+        return _sum_of_squares(weights, chunks) / self.selection[1].size
 
     def gradient(self, weights: Weights) -> tuple[float, Array]:
         """Mean squared error and its gradient (w,)."""
         total, gradient = 0.0, np.zeros(sum(matrix.size for matrix in weights))
         with np.errstate(over="ignore", invalid="ignore"):
-            for inputs, targets in self.chunks():
-                layers, errors = forward(weights, self.activation, inputs)
-                errors -= targets
+            for chunk in self.chunks(weights):
+                errors = chunk.errors(weights)
                 total += float(np.vdot(errors, errors))
-                slopes = slopes_of(layers, self.activation)
-                gradient += backward(weights, layers, slopes, errors)
+                gradient += backward(weights, chunk.layers, chunk.slopes, errors)
             return total / self.targets.size, gradient * (2.0 / self.targets.size)
 
     def bending(self, weights: Weights, direction: Weights) -> Array:
         """J^T r (w,), r the second derivative of the outputs along `direction`."""
         product = np.zeros(sum(matrix.size for matrix in weights))
         with np.errstate(over="ignore", invalid="ignore"):
-            for inputs, _ in self.chunks():
-                layers, _ = forward(weights, self.activation, inputs)
-                slopes = slopes_of(layers, self.activation)
+            for chunk in self.chunks(weights):
+                layers, slopes = chunk.layers, chunk.slopes
                 second = second_derivative(weights, self.activation, layers, slopes, direction)
                 product += backward(weights, layers, slopes, second)
         return product
+
+    def _new_chunks(self, weights: Weights, inputs: Array, targets: Array) -> Iterator[Chunk]:
+        n = targets.shape[1]
+        # chunks of equal length, none of a few samples only
+        length = math.ceil(n / math.ceil(n / self.chunk_length))
+        for first in range(0, n, length):
+            part = slice(first, first + length)
+            layers = forward(weights, self.activation, inputs[:, part])
+            yield Chunk(inputs[:, part], targets[:, part], layers, self.activation)
 
 
 def problem(
@@ -88,19 +139,10 @@ def _with_bias(inputs: Array) -> Array:
     return np.vstack([inputs.T, np.ones(len(inputs))])
 
 
-def _chunks(inputs: Array, targets: Array, chunk_length: int) -> Iterator[tuple[Array, Array]]:
-    for first in range(0, targets.shape[1], chunk_length):
-        chunk = slice(first, first + chunk_length)
-        yield inputs[:, chunk], targets[:, chunk]
-
-
-def _mean_squared_error(
-    weights: Weights, activation: str, chunks: Iterator[tuple[Array, Array]]
-) -> float:
+def _sum_of_squares(weights: Weights, chunks: Iterator[Chunk]) -> float:
     total = 0.0
     with np.errstate(over="ignore", invalid="ignore"):
-        for inputs, targets in chunks:
-            _, errors = forward(weights, activation, inputs)
-            errors -= targets
+        for chunk in chunks:
+            errors = chunk.errors(weights)
             total += float(np.vdot(errors, errors))
     return total

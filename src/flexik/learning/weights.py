@@ -69,31 +69,20 @@ def _nguyen_widrow(
     return magnitude * np.column_stack([direction, bias])
 
 
-def forward(
-    weights: Weights, activation: str, inputs: Array, last: Array | None = None
-) -> tuple[list[Array], Array]:
-    """Outputs of all layers for inputs (p + 1, c), whose last row is 1.
+def forward(weights: Weights, activation: str, inputs: Array) -> list[Array]:
+    """`inputs` (p + 1, c), whose last row is 1, and the output of every hidden layer.
 
-    Parameters
-    ----------
-    last : (units + 1, c), where to write the last hidden layer
-
-    Returns
-    -------
-    layers : `inputs` and the output (units + 1, c) of every hidden layer, last row 1
-    outputs : (q, c)
+    The outputs are (units + 1, c), their last row 1 as well; ``weights[-1] @ layers[-1]`` are
+    those of the network (q, c).
     """
     layers = [inputs]
-    for k, matrix in enumerate(weights[:-1], start=1):
-        if last is not None and k == len(weights) - 1:
-            layer = last
-        else:
-            layer = np.empty((len(matrix) + 1, inputs.shape[1]))
+    for matrix in weights[:-1]:
+        layer = np.empty((len(matrix) + 1, inputs.shape[1]))
         np.matmul(matrix, layers[-1], out=layer[:-1])
         activate(layer[:-1], activation, out=layer[:-1])
         layer[-1] = 1.0
         layers.append(layer)
-    return layers, weights[-1] @ layers[-1]
+    return layers
 
 
 def slopes_of(layers: list[Array], activation: str) -> list[Array]:

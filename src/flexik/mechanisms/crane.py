@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flexik.errors import ParameterError
+
 Array = NDArray[np.float64]
 Vector = tuple[float, float]
 
@@ -145,6 +147,17 @@ def pose(geometry: CraneGeometry, strokes: Array) -> CranePose:
         lift_angle=lift_angle,
         jib_angle=jib_angle,
     )
+
+
+def check_assembly(geometry: CraneGeometry, n_steps: int = 201) -> None:
+    """Raise ParameterError unless the linkage closes over the strokes of lift and jib cylinder."""
+    steps = np.linspace(0.0, 1.0, n_steps)[:, None]
+    for number, name in enumerate(("lift", "jib")):
+        strokes = steps * np.eye(3)[number] * geometry.stroke_maximum
+        broken = np.isnan(pose(geometry, strokes).tip).any(axis=1)
+        if broken.any():
+            stroke = strokes[np.argmax(broken), number]
+            raise ParameterError(f"the linkage does not close at a {name} stroke of {stroke:.3g} m")
 
 
 def forward(geometry: CraneGeometry, strokes: Array) -> Array:

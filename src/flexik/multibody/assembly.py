@@ -1,6 +1,11 @@
 """The flexible crane as params.yaml describes it."""
 
+import math
+from pathlib import Path
+
 from flexik import parameters
+from flexik.errors import DataError
+from flexik.files import read_json
 from flexik.mechanisms.crane import CraneGeometry
 from flexik.multibody.crane import CraneStructure, FlexibleCrane, Rod
 from flexik.multibody.structure import Beam, read_section
@@ -12,27 +17,33 @@ def flexible_crane(crane: parameters.Crane, spring_stiffness: float) -> Flexible
     Raises DataError if a section table cannot be read.
     """
     given = crane.structure
-    beams = {
-        name: _beam(getattr(given.beams, name), given.youngs_modulus)
-        for name in type(given.beams).model_fields
-    }
+    beams = {name: _beam(given, name) for name in type(given.beams).model_fields}
     structure = CraneStructure(
         **beams,
         rocker=Rod(given.rocker.mass, given.rocker.centre_of_mass),
         coupler=Rod(given.coupler.mass, given.coupler.centre_of_mass),
         lift_axis_height=given.lift_axis_height,
         jib_axis_height=given.jib_axis_height,
-        extension_overlap=given.extension_overlap,
-        front_pad=given.front_pad,
         gravity=given.gravity,
     )
     geometry = CraneGeometry(**crane.geometry.model_dump())
     return FlexibleCrane(geometry, structure, spring_stiffness, given.element)
 
 
-def _beam(given: parameters.BeamModel, youngs_modulus: float) -> Beam:
-    return Beam(
-        section=read_section(given.section),
-        youngs_modulus=youngs_modulus,
-        **given.model_dump(exclude={"section"}),
-    )
+def read_spring_stiffness(path: Path | str) -> float:
+    """Fitted ground spring in N m/rad; raises DataError if the file is missing or damaged."""
+    calibration = read_json(path)
+    stiffness = calibration.get("spring_stiffness") if isinstance(calibration, dict) else None
+    if not isinstance(stiffness, float) or not 0.0 < stiffness < math.inf:
+        raise DataError(f"{path}: expected a positive number spring_stiffness, got {stiffness!r}")
+    return stiffness
+
+
+def _beam(structure: parameters.Structure, name: str) -> Beam:
+    given = getattr(structure.beams, name)
+    try:
+        section = read_section(given.section)
+    except DataError as error:
+        raise DataError(f"crane.structure.beams.{name}.section: {error}") from None
+    others = given.model_dump(exclude={"section"})
+    return Beam(section=section, youngs_modulus=structure.youngs_modulus, **others)

@@ -39,8 +39,8 @@ class CraneStructure:
     """What bends and weighs. Lengths in m, masses in kg.
 
     axis_height : height of the lift and jib axes above B and G in the lift and jib frames.
-    extension_overlap : distance from the rear end of the extension to J at zero stroke.
-    front_pad : abscissa of the front pad, the end of the jib, in the jib frame.
+
+    The front pad sits at the end of the jib, the rear pad at the rear end of the extension.
     """
 
     pillar: Beam
@@ -51,9 +51,17 @@ class CraneStructure:
     coupler: Rod
     lift_axis_height: float
     jib_axis_height: float
-    extension_overlap: float
-    front_pad: float
     gravity: float
+
+    @property
+    def front_pad(self) -> float:
+        """Abscissa of the front pad, jib frame."""
+        return self.jib.span[1]
+
+    @property
+    def extension_length(self) -> float:
+        """Rear end to tip."""
+        return self.extension.span[1] - self.extension.span[0]
 
 
 @dataclass(frozen=True)
@@ -230,7 +238,7 @@ class CraneModel:
         """Where abscissa zero of each beam lies and how its axis points."""
         structure = self.crane.structure
         lift, jib = float(rigid.lift_angle[0]), float(rigid.jib_angle[0])
-        overlap = structure.extension_overlap - self.extension
+        overlap = structure.extension_length - self.extension
         return {
             "pillar": (np.zeros(2), np.pi / 2),
             "lift": (_shift(rigid.lift_pivot[0], lift, 0.0, structure.lift_axis_height), lift),
@@ -264,7 +272,7 @@ class CraneModel:
     def _rear_pad(self) -> float:
         """Abscissa of the rear pad on the jib, m."""
         start = self.crane.geometry.extension_start_in_jib[0]
-        return start + self.extension - self.crane.structure.extension_overlap
+        return start + self.extension - self.crane.structure.extension_length
 
     def _support_pillar(self) -> tuple[int, int, int]:
         """Pin the base and hold its rotation by the ground spring: connectors of x, y, rotation."""

@@ -89,8 +89,9 @@ def read_section(path: Path | str) -> Section:
     path = Path(path)
     try:
         table = np.genfromtxt(path, delimiter=",", names=True, dtype=float, encoding="utf-8")
-    except (OSError, ValueError) as error:
-        raise DataError(f"section table {path}: cannot be read ({error})") from None
+    except (OSError, ValueError, IndexError) as error:
+        reason = " ".join(str(error).split())
+        raise DataError(f"section table {path}: cannot be read ({reason})") from None
     if table.dtype.names != SECTION_COLUMNS:
         raise DataError(f"section table {path}: columns {table.dtype.names}, not {SECTION_COLUMNS}")
     x, second_moment, area = (np.atleast_1d(table[name]) for name in SECTION_COLUMNS)

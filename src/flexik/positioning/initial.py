@@ -23,7 +23,9 @@ def initial_positions(geometry: CraneGeometry, targets: Array) -> Array:
     targets = checked("targets", targets, None, 2)
     solution = inverse_with_smallest_extension(geometry, targets)
     if not solution.reached.all():
-        missed = ", ".join(f"({x:g}, {y:g})" for x, y in targets[~solution.reached])
+        missed = ", ".join(
+            f"({x:g}, {y:g})" for x, y in np.unique(targets[~solution.reached], axis=0)
+        )
         raise UnreachableError(f"the rigid crane does not reach {missed} (x, y in m)")
     # whole steps inside the limits; the slack is for limits that are whole steps themselves
     most = np.floor(np.array(geometry.stroke_maximum) / STEP + 1e-6)

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from flexik import parameters
-from flexik.datasets.crane import counts
+from flexik.datasets.crane import counts, kept
 from flexik.datasets.evaluations import CONDITION_FIELDS
 from flexik.evaluation.errors import STATISTICS, comparison, statistics
 from flexik.files import file_checksum, write_json, write_text
@@ -18,15 +18,15 @@ from flexik.parameters import parameters_checksum
 from flexik.positioning.initial import initial_positions
 from flexik.reporting import (
     crane_figures,
+    crane_notes,
     crane_schematic,
     error_figures,
     learning_figures,
     page,
+    style,
     tables,
 )
 
-STAND_IN = (2.0, -3.95)
-GA_DIAGNOSTIC = "corrected_n_generations"
 SIZE_TABLE = [
     "n_hidden",
     "training_error",
@@ -69,9 +69,12 @@ class Results:
         return {label: statistics(frame) for label, frame in self.errors.items()}
 
     @property
-    def published_columns(self) -> dict[str, str]:
-        """Published column that stands beside each method of params.yaml."""
-        return {label: method.method for label, method in self.crane.methods.items()}
+    def published_columns(self) -> dict[str, str | None]:
+        """Published column that stands beside each method of params.yaml; None: there is none."""
+        return {
+            label: method.method if method.method in self.published.columns else None
+            for label, method in self.crane.methods.items()
+        }
 
 
 def write_report(results: Results, folder: Path, published_file: Path) -> None:
@@ -102,18 +105,23 @@ def _write_tables(results: Results, folder: Path) -> None:
     errors = tables.positioning_errors_table(found, published, results.published_columns)
     n = found["none"]["n_conditions"]
     caption = f"Simulated positioning errors over {n} conditions, beside Rouvinen (1999)."
-    notes = [*_point_notes(results.crane), *_genetic_notes(results.errors)]
+    notes = _errors_notes(results)
     tables.write_table(folder / "positioning_errors", errors, 2, caption, notes)
 
     fitted = tables.calibration_table(found["none"], published)
     caption = "Uncompensated crane after the fit of the ground spring; mean R is what was fitted."
-    notes = _worst_point_notes(results.errors["none"])
+    notes = [
+        *crane_notes.calibration_notes(fitted),
+        *crane_notes.worst_point_notes(results.errors["none"]),
+    ]
     tables.write_table(folder / "calibration", fitted, {"difference (%)": 1}, caption, notes)
 
     _write_mesh_table(results, folder)
     caption = (
         "Every restart of every network: root mean square errors of the normalised outputs on the "
-        "training grid and on the selection set, which chooses."
+        "training grid and on the selection set, which chooses. The selection error can be the "
+        "smaller: the grid puts many samples at the ends of strokes and payload, where networks "
+        "fit worst; the selection set is spread evenly inside."
     )
     decimals = {"training error": 4, "selection error": 4}
     training = results.training.rename(columns=lambda name: name.replace("_", " "))
@@ -129,13 +137,24 @@ def _write_tables(results: Results, folder: Path) -> None:
     write_text(folder / "errors.csv", text)
 
 
+def _errors_notes(results: Results) -> list[str]:
+    """What the numbers of the table owe to points, payloads and failures."""
+    errors = results.errors
+    notes = crane_notes.point_notes(results.crane.evaluation.points)
+    notes += crane_notes.worse_notes(errors)
+    payload = errors["none"]["payload"]
+    notes += crane_notes.extrapolation_notes(payload, kept(results.grid)["payload"])
+    return [*notes, *crane_notes.failure_notes(errors), *crane_notes.genetic_notes(errors)]
+
+
 def _write_mesh_table(results: Results, folder: Path) -> None:
     study = results.mesh_study.copy()
+    style.require("mesh study", study, ("n_samples", "mean_relative", "max_relative"))
+    n_samples = study.pop("n_samples").max()
     shares = {f"{k} (% of deflection)": 100 * study.pop(f"{k}_relative") for k in ("mean", "max")}
     caption = (
         f"Tip against the mesh of refinement {study['refinement'].max()} with "
-        f"{results.crane.structure.element} elements, {results.crane.mesh_study.n_samples} random "
-        "samples."
+        f"{results.crane.structure.element} elements, {n_samples} random samples."
     )
     study = tables.mesh_table(study).assign(**shares)
     decimals = {str(name): 2 if name in shares else 3 for name in study}
@@ -165,45 +184,6 @@ def _published_size(crane: parameters.Crane, name: str) -> int | None:
     kind = crane.selected_networks[name].kind
     sizes = [network.n_hidden for network in crane.networks.values() if network.kind == kind]
     return sizes[0] if sizes else None
-
-
-def _point_notes(crane: parameters.Crane) -> list[str]:
-    """What to know about the test points beside the published values."""
-    notes = [
-        "The thesis' figure with its 25 points is lost: its text names six of them, the others "
-        "here fill the reach evenly (params.yaml). Single maxima depend on the points."
-    ]
-    if STAND_IN in crane.evaluation.points:
-        notes.append(
-            "(2, -3.95) stands in for the thesis' point (2, -4), which the loaded crane cannot "
-            "reach."
-        )
-    return notes
-
-
-def _worst_point_notes(frame: pd.DataFrame) -> list[str]:
-    """Where the largest error is, and how much it owes to one test point."""
-    worst = frame.iloc[int(frame["error"].to_numpy().argmax())]
-    others = frame.loc[frame["point"] != worst["point"], "error"]
-    if others.empty:
-        return []
-    return [
-        f"max R is that of the point ({worst['target_x']:g}, {worst['target_y']:g}) with "
-        f"{worst['payload']:g} kg, |dX| {1e3 * abs(worst['error_x']):.1f} mm and "
-        f"|dY| {1e3 * abs(worst['error_y']):.1f} mm; the other points stay below "
-        f"{1e3 * others.max():.1f} mm."
-    ]
-
-
-def _genetic_notes(frames: dict[str, pd.DataFrame]) -> list[str]:
-    """How long the genetic inverses searched."""
-    return [
-        f"{label}: the genetic inverse of the corrected target took "
-        f"{frame[GA_DIAGNOSTIC].mean():.0f} generations on average, "
-        f"{frame[GA_DIAGNOSTIC].max()} at most."
-        for label, frame in frames.items()
-        if GA_DIAGNOSTIC in frame
-    ]
 
 
 def _write_figures(results: Results, folder: Path) -> None:
@@ -268,10 +248,8 @@ def _errors_section(results: Results, folder: Path) -> page.Section:
     return page.Section(
         "Positioning errors",
         "Error = desired minus achieved tip position; achieved by the flexible model at the "
-        "commanded strokes. `none`: rigid inverse kinematics alone. `combined`: rigid inverse, "
-        "deflection network, corrected target, rigid inverse again, in closed form; the `_ga` "
-        "variant searches with the genetic algorithm of the thesis, which stops below 5 mm and so "
-        "sets its own floor. Every error: [errors.csv](errors.csv), SI units.",
+        f"commanded strokes.\n\n{crane_notes.methods_text(results.crane.methods)}\n\n"
+        "Every error: [errors.csv](errors.csv), SI units.",
         [folder / "positioning_errors.md"],
         figures,
     )
@@ -283,10 +261,10 @@ def _training_section(results: Results, folder: Path) -> page.Section:
     behind = results.crane.grid.minimum_tip_x
     return page.Section(
         "Training data",
-        f"Grid of table 4.1: {n['n_samples']} vectors, {n['n_kept']} kept, {n['n_left_out']} left "
-        f"out (rigid tip behind x = {behind:g} m), {n['n_failed']} failed. The selection set of "
-        f"{len(results.selection)} vectors is drawn at random, apart from the grid and from the "
-        "test conditions.",
+        f"Training grid (table 4.1 of the thesis by default): {n['n_samples']} vectors, "
+        f"{n['n_kept']} kept, {n['n_left_out']} left out (rigid tip behind x = {behind:g} m), "
+        f"{n['n_failed']} failed. The selection set of {len(results.selection)} vectors is drawn "
+        "at random, apart from the grid and from the test conditions.",
         [folder / "training.md"],
         [
             (figures / "training_points.png", "Training points (after figure 3.4)."),

@@ -169,7 +169,7 @@ def _carry(reference: Array, bent: Array, point: Array) -> Array:
 def _extent(shapes: list[Array]) -> Array:
     """Lower left and upper right corner (2, 2) of all points, with room for labels, m."""
     points = np.concatenate([np.atleast_2d(shape) for shape in shapes])
-    room = np.array([[-0.95, -0.5], [0.9, 0.55]])
+    room = np.array([[-0.95, -0.5], [0.9, 0.9]])
     return np.array([points.min(axis=0), points.max(axis=0)]) + room
 
 

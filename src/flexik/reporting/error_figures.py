@@ -1,6 +1,7 @@
 """Positioning errors drawn: condition by condition, and methods beside the published ones."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -21,7 +22,7 @@ ERROR_ROWS = {"error_x": "dX (mm)", "error_y": "dY (mm)", "error": "R (mm)"}
 LINEAR_BELOW = 1.0
 
 COMPARED = {"mean_error": "mean R (mm)", "max_error": "max R (mm)"}
-OURS, THEIRS = style.BLUE, "#B0B0B0"
+OURS, THEIRS = style.BLUE, style.INK
 PUBLISHED = " published"  # ends the name of a published column
 
 
@@ -128,7 +129,8 @@ def _draw_compensated(
 
 def _places(frame: pd.DataFrame, payloads: list[float]) -> pd.Series:
     """Abscissa of every condition: its point's number, spread by payload."""
-    spread = dict(zip(payloads, np.linspace(-0.34, 0.34, len(payloads)), strict=True))
+    offsets = np.linspace(-0.34, 0.34, len(payloads)) if len(payloads) > 1 else [0.0]
+    spread = dict(zip(payloads, offsets, strict=True))
     return pd.factorize(frame["point"])[0] + frame["payload"].map(spread)
 
 
@@ -187,32 +189,47 @@ def _figure_method_comparison(statistics: pd.DataFrame) -> Figure:
         ours = [rows[name][label] for label in labels]
         published = [rows[name].get(label + PUBLISHED, np.nan) for label in labels]
         known = [value for value in (*ours, *published) if np.isfinite(value)]
-        start = 10.0 ** np.floor(np.log10(min(known)))
         axes.set_xscale("log")
-        axes.set_xlim(start, 3.2 * max(known))
-        _bars(axes, ours, start, OURS, shift=-0.2)
-        _bars(axes, published, start, THEIRS, shift=0.2)
+        axes.set_xlim(min(known) / 2, 2 * max(known))  # room for the numbers
+        for k, pair in enumerate(zip(ours, published, strict=True)):
+            axes.plot(pair, (k, k), color=style.GREY, linewidth=1.2, zorder=1.5)
+        _dots(axes, published, THEIRS, 1)
+        _dots(axes, ours, OURS, -1)
         axes.set_xlabel(f"{axis_label}, logarithmic")
         axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
         axes.grid(visible=False, axis="y")
     panels[0].set_yticks(range(len(labels)), labels)
     panels[0].set_ylim(len(labels) - 0.5, -0.5)
-    handles = [Line2D([], [], color=colour, linewidth=7) for colour in (OURS, THEIRS)]
+    handles = [
+        Line2D([], [], linestyle="none", color=colour, **_dot(colour)) for colour in (OURS, THEIRS)
+    ]
     figure.legend(handles, ["ours", "published"], loc="outside upper center", ncols=2)
     return figure
 
 
-def _bars(axes: Axes, values: list[float], start: float, colour: str, shift: float) -> None:
-    """Bars from `start` to `values`, the number at their ends; none for NaN."""
+def _dot(colour: str) -> dict[str, Any]:
+    """Look of a dot: ours filled, the published ones open and larger, so that both are seen."""
+    ours = colour == OURS
+    return {
+        "marker": "o",
+        "markersize": 6.5 if ours else 9.5,
+        "markerfacecolor": OURS if ours else "white",
+    }
+
+
+def _dots(axes: Axes, values: list[float], colour: str, side: int) -> None:
+    """Dots at `values`, their numbers below (`side` 1) or above (-1) them; none for NaN."""
     for k, value in enumerate(values):
         if np.isnan(value):
             continue
-        axes.barh(k + shift, value - start, 0.36, left=start, color=colour)
+        axes.plot([value], [k], linestyle="none", color=colour, **_dot(colour))
         axes.annotate(
             f"{value:.2f}",
-            (value, k + shift),
-            (3, 0),
+            (value, k),
+            (0, -13 * side),
             textcoords="offset points",
+            ha="center",
             va="center",
             fontsize=9,
+            color=colour,
         )

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from flexik.reporting import style
 
@@ -44,7 +45,7 @@ def _figure_size_selection(
     sizes: pd.DataFrame, chosen: int, published: int | None, tolerance: float
 ) -> Figure:
     style.require("size selection", sizes.columns, SIZE_COLUMNS)
-    figure = Figure(figsize=(style.WIDTH, 4.2))
+    figure = Figure(figsize=(style.WIDTH, 4.6))
     axes = figure.add_subplot()
     x = sizes["n_hidden"]
     axes.fill_between(
@@ -54,17 +55,27 @@ def _figure_size_selection(
         color=style.SKY,
         alpha=0.3,
         linewidth=0,
-        label="selection error, spread over restarts",
+        label="best to worst selection error of restarts",
     )
-    axes.plot(x, sizes["median_selection_error"], color=style.SKY, label="median of restarts")
     axes.plot(
-        x, sizes["selection_error"], color=style.BLUE, label="best restart", marker="o", ms=3.5
+        x,
+        sizes["median_selection_error"],
+        color=style.SKY,
+        label="median selection error of restarts",
+    )
+    axes.plot(
+        x,
+        sizes["selection_error"],
+        color=style.BLUE,
+        label="selection error of the best restart",
+        marker="o",
+        ms=3.5,
     )
     axes.plot(
         x,
         sizes["training_error"],
         color=style.ORANGE,
-        label="its training error",
+        label="training error of the best restart",
         marker="o",
         ms=3.5,
     )
@@ -72,9 +83,13 @@ def _figure_size_selection(
     if published is not None:
         axes.axvline(published, color=style.GREY, linestyle="--", label=f"published: {published}")
     axes.set_yscale("log")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("hidden neurons (1)")
     axes.set_ylabel("root mean square error, normalised (1)")
-    rule = "least selection error" if tolerance == 0 else f"within {100 * tolerance:g} % of least"
-    axes.set_title(f"Size by {rule}")
-    axes.legend(loc="upper right", ncols=2)
+    rule = "size of the least selection error"
+    if tolerance > 0:
+        rule = f"smallest size with a selection error within {100 * tolerance:g} % of the least"
+    axes.set_title(f"Choice: {rule}")
+    # beyond the axes, where no line can run through it
+    figure.legend(loc="outside upper center", ncols=2)
     return figure

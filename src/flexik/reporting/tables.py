@@ -102,7 +102,7 @@ def markdown(
 def positioning_errors_table(
     by_method: Mapping[str, Mapping[str, float]],
     published: pd.DataFrame,
-    column_of: Mapping[str, str] | None = None,
+    column_of: Mapping[str, str | None] | None = None,
 ) -> pd.DataFrame:
     """Six statistics in mm, ours and the published one for every method; then the counts.
 
@@ -113,7 +113,8 @@ def positioning_errors_table(
     published
         A column `statistic` and a column (mm) for every published method.
     column_of
-        Published column of a label where it is not the label itself.
+        Published column of a label where it is not the label itself; None where nothing is
+        published, which leaves the cells empty.
 
     Returns
     -------

@@ -1,0 +1,70 @@
+"""Check params.yaml before any other stage runs, and remove results of names it no longer has.
+
+DVC deletes the outputs of a stage before running it, so a wrong value must be found before.
+Reads params.yaml. Writes data/validated.txt, whose content never changes.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from flexik import parameters, stage
+from flexik.errors import FlexikError, ParameterError
+from flexik.files import write_text
+from flexik.mechanisms.crane import CraneGeometry, check_assembly, smallest_extension
+from flexik.parameters import load_parameters
+
+OUTPUT = Path("data/validated.txt")
+DATA = Path("data/crane")
+
+
+def main() -> None:
+    """Run the stage; with --check alone nothing is written or removed."""
+    crane = load_parameters().crane
+    check_crane(crane)
+    if sys.argv[1:] == ["--check"]:
+        return
+    if sys.argv[1:]:
+        raise FlexikError("usage: validate.py [--check]")
+    remove_stale(crane)
+    write_text(OUTPUT, "params.yaml is valid\n")
+
+
+def check_crane(crane: parameters.Crane) -> None:
+    """Checks that need kinematics: the linkage closes, every test point is reached."""
+    geometry = CraneGeometry(**crane.geometry.model_dump())
+    try:
+        check_assembly(geometry)
+    except ParameterError as error:
+        raise ParameterError(f"params.yaml: crane.geometry: {error}") from None
+    points = np.array(crane.evaluation.points)
+    missed = np.isnan(smallest_extension(geometry, points))
+    if missed.any():
+        number = int(np.argmax(missed))
+        x, y = points[number]
+        raise ParameterError(
+            f"params.yaml: crane.evaluation.points.{number}: the rigid crane does not reach "
+            f"({x:g}, {y:g}) m" + (f", nor {missed.sum() - 1} others" if missed.sum() > 1 else "")
+        )
+
+
+def remove_stale(crane: parameters.Crane) -> None:
+    """Delete what stages of earlier names left, which would stay inputs of the report."""
+    networks = {*crane.networks, *crane.selected_networks}
+    current = {
+        "evaluations": {f"{label}.parquet" for label in ("none", *crane.methods)},
+        "networks": {f"{name}{end}" for name in networks for end in (".json", "_training.csv")},
+        "size_selection": {
+            f"{name}{end}" for name in crane.selected_networks for end in (".json", ".parquet")
+        },
+    }
+    for folder, names in current.items():
+        for path in (DATA / folder).glob("[!.]*"):
+            if path.is_file() and path.name not in names:
+                print(f"removing {path}: its name is not in params.yaml")
+                path.unlink()
+
+
+if __name__ == "__main__":
+    stage.run(main)

@@ -1,0 +1,97 @@
+"""The stage that looks at params.yaml before any other."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from flexik.errors import ParameterError
+from flexik.mechanisms.crane import CraneGeometry, check_assembly
+from flexik.parameters import load_parameters
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "params.yaml").write_text((ROOT / "params.yaml").read_text())
+    return tmp_path
+
+
+def change(folder, *path_and_value):
+    data = yaml.safe_load((folder / "params.yaml").read_text())
+    section = data["crane"]
+    *path, last, value = path_and_value
+    for name in path:
+        section = section[name]
+    section[last] = value
+    (folder / "params.yaml").write_text(yaml.safe_dump(data))
+
+
+def validate(folder, *arguments):
+    return subprocess.run(
+        [sys.executable, ROOT / "stages/validate.py", *arguments],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": str(ROOT / "src")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_valid_parameters_pass_and_leave_a_constant_file(folder):
+    assert validate(folder, "--check").returncode == 0
+    assert not (folder / "data").exists()
+    assert validate(folder).returncode == 0
+    before = (folder / "data/validated.txt").read_bytes()
+    change(folder, "grid", "minimum_tip_x", 0.1)
+    assert validate(folder).returncode == 0
+    assert (folder / "data/validated.txt").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("where", "key"),
+    [
+        (("evaluation", "points", [[4.0, 1.0], [9.0, 9.0]]), "crane.evaluation.points.1"),
+        (("geometry", "jib_cylinder_length", 0.2), "crane.geometry: the linkage does not close"),
+        (("geometry", "stroke_maximum", [0.535, 1.5, 1.6]), "crane.geometry: the linkage"),
+        (("structure", "beams", "lift", "span", [0.0, 2.9]), "structure.beams.lift.span.1"),
+        (("structure", "rocker", "centre_of_mass", 5.0), "structure.rocker.centre_of_mass"),
+        (("methods", "combined", "network", "foo"), "crane.methods.combined.network"),
+        (("methods", None), "crane.methods"),
+        (("foo", 1), "crane.foo"),
+    ],
+)
+def test_a_mistake_is_one_line_that_names_the_key(folder, where, key):
+    change(folder, *where)
+    done = validate(folder)
+    assert done.returncode == 1
+    assert key in done.stderr
+    assert "Traceback" not in done.stderr and len(done.stderr.splitlines()) == 1
+    assert not (folder / "data").exists()
+
+
+def test_results_of_names_that_are_gone_are_removed(folder):
+    crane = load_parameters(folder / "params.yaml").crane
+    label = next(iter(crane.methods))
+    kept = folder / f"data/crane/evaluations/{label}.parquet"
+    stale = [
+        folder / "data/crane/evaluations/gone.parquet",
+        folder / "data/crane/networks/gone_training.csv",
+    ]
+    for path in (kept, *stale):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    done = validate(folder)
+    assert kept.exists() and not any(path.exists() for path in stale)
+    assert "gone.parquet" in done.stdout
+
+
+def test_linkage_closes_over_the_strokes(geometry):
+    check_assembly(geometry)
+    longer = CraneGeometry(**{**vars(geometry), "stroke_maximum": (0.535, 1.5, 1.6)})
+    with pytest.raises(ParameterError, match="jib stroke of"):
+        check_assembly(longer)
