@@ -8,6 +8,9 @@ from matplotlib.ticker import MaxNLocator
 
 from flexik.reporting import style
 
+# Sizes that each get a tick
+FEW_SIZES = 15
+
 SIZE_COLUMNS = (
     "n_hidden",
     "training_error",
@@ -83,7 +86,10 @@ def _figure_size_selection(
     if published is not None:
         axes.axvline(published, color=style.GREY, linestyle="--", label=f"published: {published}")
     axes.set_yscale("log")
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    if len(x) <= FEW_SIZES:
+        axes.set_xticks(x)
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("hidden neurons (1)")
     axes.set_ylabel("root mean square error, normalised (1)")
     rule = "size of the least selection error"
