@@ -11,7 +11,7 @@ export MKL_NUM_THREADS := 1
 export DVC_NO_ANALYTICS := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: repro smoke test lint benchmark setup clean
+.PHONY: repro smoke test lint benchmark benchmark-training setup clean
 
 repro: $(VENV)/.pipeline ## run the pipeline; only what changed is computed
 	$(BIN)/python stages/validate.py --check
@@ -31,6 +31,9 @@ lint: $(VENV)/.dev ## formatting, lint and types
 benchmark: $(VENV)/.dev ## timings of the generation beside other ways; writes reports/benchmarks/
 	$(BIN)/python benchmarks/generate.py
 
+benchmark-training: $(VENV)/.benchmark ## timings of the trainers beside other packages
+	$(BIN)/python benchmarks/training.py
+
 setup: $(VENV)/.dev ## everything a developer needs
 
 $(VENV)/.python:
@@ -44,6 +47,10 @@ $(VENV)/.pipeline: $(VENV)/.python pyproject.toml constraints.txt
 
 $(VENV)/.dev: $(VENV)/.pipeline
 	$(PIP) -e '.[dev,dask]'
+	@touch $@
+
+$(VENV)/.benchmark: $(VENV)/.dev
+	$(PIP) -e '.[benchmark]'
 	@touch $@
 
 clean: ## remove the environment and everything DVC can make again
