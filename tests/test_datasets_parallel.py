@@ -173,7 +173,15 @@ def test_bad_environment_is_told(monkeypatch, value):
         from_environment(ParallelSettings())
 
 
-@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://x"])
+@pytest.mark.parametrize(
+    "address", ["garbage", "127.0.0.1:8786", "tcp://127.0.0.1", "nonsense://x"]
+)
+def test_what_is_no_address_is_told_at_once(address):
+    with pytest.raises(ParameterError, match=f"FLEXIK_SCHEDULER.*'{address}', expected an address"):
+        ParallelSettings(scheduler=address)
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense://x:1"])
 def test_an_unanswered_scheduler_is_told(monkeypatch, address):
     monkeypatch.setattr(parallel, "CONNECT_SECONDS", 0.3)
     settings = ParallelSettings(scheduler=address)

@@ -6,6 +6,7 @@ is evaluated alone, with one BLAS thread. Items should take well over a millisec
 
 import contextlib
 import os
+import re
 import sys
 import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -24,6 +25,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 CONNECT_SECONDS = 10.0
+_ADDRESS = re.compile(r"[a-z]+://\S+:\d+")
 # Items handed to joblib at once, per worker: joblib keeps results until they are fetched, so this
 # bounds memory. The workers idle for about half an item at the end of each batch.
 BATCH_PER_WORKER = 64
@@ -45,6 +47,11 @@ class ParallelSettings:
         if self.n_workers < 0:
             raise ParameterError(
                 f"n_workers must be 0 (all cores) or positive, got {self.n_workers}"
+            )
+        if self.scheduler is not None and not _ADDRESS.fullmatch(self.scheduler):
+            raise ParameterError(
+                f"scheduler (or FLEXIK_SCHEDULER) is {self.scheduler!r}, expected an address like "
+                "tcp://127.0.0.1:8786"
             )
 
 
