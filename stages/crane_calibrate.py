@@ -12,6 +12,7 @@ import pandas as pd
 
 from flexik import stage
 from flexik.datasets.tables import read_csv
+from flexik.errors import DataError
 from flexik.evaluation.calibration import fit_spring
 from flexik.evaluation.conditions import all_conditions
 from flexik.evaluation.errors import evaluate, statistics
@@ -39,7 +40,9 @@ def main() -> None:
         flexible_tip = functools.partial(tips, flexible_crane(crane, stiffness))
         return evaluate(method, conditions, initial, flexible_tip)
 
-    published = read_csv(PUBLISHED, ("statistic", "none")).set_index("statistic")["none"]
+    published = read_csv(PUBLISHED, ("none",), ("statistic",)).set_index("statistic")["none"]
+    if "mean_error" not in published:
+        raise DataError(f"{PUBLISHED}: expected a row mean_error")
     mean_error = 1e-3 * float(published["mean_error"])
     fit = fit_spring(uncompensated, mean_error, crane.calibration.stiffness_range)
     print(f"ground spring {fit.spring_stiffness:.6g} N m/rad")

@@ -17,9 +17,10 @@ from flexik import parameters, stage
 from flexik.datasets.crane_learning import INPUT_FIELDS, KINDS, read_learning_data
 from flexik.datasets.parallel import ParallelSettings, from_environment, parallel_map
 from flexik.datasets.provenance import network_checksum
-from flexik.errors import DataError, ParameterError, TrainingError
-from flexik.files import read_json, write_text
+from flexik.errors import ParameterError, TrainingError
+from flexik.files import write_text
 from flexik.learning.perceptron import quantities
+from flexik.learning.size_selection import read_choice
 from flexik.learning.storage import save_network
 from flexik.learning.training import Architecture, TrainingRecord, train_best, trainer_settings
 from flexik.multibody.assembly import read_spring_stiffness
@@ -67,11 +68,7 @@ def size_of(network: parameters.NetworkModel | parameters.SelectedNetwork, name:
     """Number of hidden neurons, given or chosen."""
     if isinstance(network, parameters.NetworkModel):
         return network.n_hidden
-    path = DATA / "size_selection" / f"{name}.json"
-    chosen = read_json(path)
-    if not isinstance(chosen, dict) or not isinstance(chosen.get("n_hidden"), int):
-        raise DataError(f"{path}: expected an integer n_hidden")
-    return chosen["n_hidden"]
+    return read_choice(DATA / "size_selection" / f"{name}.json")
 
 
 def summary(records: list[TrainingRecord], n_hidden: int | tuple[int, ...]) -> str:

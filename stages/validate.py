@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from flexik import parameters, stage
-from flexik.errors import FlexikError, ParameterError
+from flexik.errors import DataError, FlexikError, ParameterError
 from flexik.files import write_text
 from flexik.mechanisms.crane import CraneGeometry, check_assembly, smallest_extension
+from flexik.multibody.assembly import flexible_crane
 from flexik.parameters import load_parameters
 
 OUTPUT = Path("data/validated.txt")
@@ -32,8 +33,12 @@ def main() -> None:
 
 
 def check_crane(crane: parameters.Crane) -> None:
-    """Checks that need kinematics: the linkage closes, every test point is reached."""
+    """Section tables are there, the linkage closes, every test point is reached."""
     geometry = CraneGeometry(**crane.geometry.model_dump())
+    try:
+        flexible_crane(crane, 1.0)
+    except DataError as error:
+        raise ParameterError(f"params.yaml: {error}") from None
     try:
         check_assembly(geometry)
     except ParameterError as error:

@@ -44,6 +44,7 @@ def results(crane):
         selection=nothing,
         errors={},
         published=published,
+        published_sizes={"deflection": 14},
         mesh_study=mesh,
         training=nothing,
         studies={},

@@ -1,6 +1,7 @@
 """The stage that looks at params.yaml before any other."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +19,7 @@ ROOT = Path(__file__).resolve().parents[1]
 @pytest.fixture
 def folder(tmp_path):
     (tmp_path / "params.yaml").write_text((ROOT / "params.yaml").read_text())
+    shutil.copytree(ROOT / "data/reference", tmp_path / "data/reference")
     return tmp_path
 
 
@@ -44,7 +46,7 @@ def validate(folder, *arguments):
 
 def test_valid_parameters_pass_and_leave_a_constant_file(folder):
     assert validate(folder, "--check").returncode == 0
-    assert not (folder / "data").exists()
+    assert not (folder / "data/validated.txt").exists()
     assert validate(folder).returncode == 0
     before = (folder / "data/validated.txt").read_bytes()
     change(folder, "grid", "minimum_tip_x", 0.1)
@@ -63,6 +65,11 @@ def test_valid_parameters_pass_and_leave_a_constant_file(folder):
         (("methods", "combined", "network", "foo"), "crane.methods.combined.network"),
         (("methods", None), "crane.methods"),
         (("foo", 1), "crane.foo"),
+        (("networks", "deflection", "trainer", "mu", 1e11), "crane.networks.deflection.trainer.mu"),
+        (
+            ("structure", "beams", "jib", "section", "data/nosuch.csv"),
+            "crane.structure.beams.jib.section: section table data/nosuch.csv",
+        ),
     ],
 )
 def test_a_mistake_is_one_line_that_names_the_key(folder, where, key):
@@ -71,7 +78,7 @@ def test_a_mistake_is_one_line_that_names_the_key(folder, where, key):
     assert done.returncode == 1
     assert key in done.stderr
     assert "Traceback" not in done.stderr and len(done.stderr.splitlines()) == 1
-    assert not (folder / "data").exists()
+    assert not (folder / "data/validated.txt").exists()
 
 
 def test_results_of_names_that_are_gone_are_removed(folder):

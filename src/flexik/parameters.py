@@ -216,22 +216,31 @@ class Stopping(Model):
     selection_patience: Count | None
 
 
-class LevenbergMarquardt(Stopping):
+class Damped(Stopping):
+    """What both schedules of Levenberg-Marquardt share."""
+
+    mu: Positive
+    mu_maximum: Positive
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.mu > self.mu_maximum:
+            raise ValueError("mu: must not exceed mu_maximum")
+        return self
+
+
+class LevenbergMarquardt(Damped):
     """The published schedule, see learning.levenberg_marquardt."""
 
     kind: Literal["levenberg_marquardt"]
-    mu: Positive
     mu_decrease: Annotated[float, Field(gt=0, lt=1)]
     mu_increase: Annotated[float, Field(gt=1)]
-    mu_maximum: Positive
 
 
-class LevenbergMarquardtAccelerated(Stopping):
+class LevenbergMarquardtAccelerated(Damped):
     """See learning.accelerated."""
 
     kind: Literal["levenberg_marquardt_accelerated"]
-    mu: Positive
-    mu_maximum: Positive
     acceleration: NotNegative
 
 
@@ -246,6 +255,12 @@ class BackPropagation(Stopping):
     rate_decrease: Annotated[float, Field(gt=0, lt=1)]
     error_increase: Annotated[float, Field(ge=1)]
     minimum_rate: Positive
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.minimum_rate > self.learning_rate:
+            raise ValueError("minimum_rate: must not exceed learning_rate")
+        return self
 
 
 class Adam(Stopping):

@@ -206,15 +206,23 @@ def _write_rows(path: Path | str, schema: pa.Schema, tables: Iterable[pa.Table])
             writer.write_table(rows, row_group_size=ROWS_PER_GROUP)
 
 
-def read_csv(path: Path | str, columns: Sequence[str]) -> pd.DataFrame:
-    """CSV table `path` with at least `columns`; raises DataError if it is missing or damaged."""
+def read_csv(path: Path | str, columns: Sequence[str], texts: Sequence[str] = ()) -> pd.DataFrame:
+    """CSV table `path` with at least the numbers `columns` and the texts `texts`.
+
+    Raises DataError if it is missing, damaged or has no row.
+    """
     try:
         table = pd.read_csv(path)
     except (OSError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise DataError(f"{path}: expected a CSV table ({reason})") from None
-    if missing := [name for name in columns if name not in table]:
-        raise DataError(f"{path}: expected columns {list(columns)}, but {missing} missing")
+    if missing := [name for name in (*texts, *columns) if name not in table]:
+        raise DataError(f"{path}: expected columns {[*texts, *columns]}, but {missing} missing")
+    for name in columns:
+        if table[name].dtype.kind not in "fiu":
+            raise DataError(f"{path}, column {name}: expected numbers")
+    if table.empty:
+        raise DataError(f"{path}: expected at least one row")
     return table
 
 

@@ -15,7 +15,8 @@ import pandas as pd
 from flexik.datasets.parallel import ParallelSettings
 from flexik.datasets.resumable import compute_table
 from flexik.datasets.tables import Field
-from flexik.errors import TrainingError
+from flexik.errors import DataError, TrainingError
+from flexik.files import read_json
 from flexik.learning.perceptron import Array, Quantity
 from flexik.learning.stopping import Stopping
 from flexik.learning.training import Architecture, train
@@ -104,6 +105,15 @@ def choose(sizes: pd.DataFrame, tolerance: float = 0.0) -> int:
         raise TrainingError("size selection: every run failed")
     allowed = sizes["selection_error"] <= (1.0 + tolerance) * sizes["selection_error"].min()
     return int(sizes.loc[allowed, "n_hidden"].min())
+
+
+def read_choice(path: Path | str) -> int:
+    """The chosen n_hidden in the JSON file `path`; raises DataError if there is none."""
+    chosen = read_json(path)
+    n_hidden = chosen.get("n_hidden") if isinstance(chosen, dict) else None
+    if not isinstance(n_hidden, int) or n_hidden < 1:
+        raise DataError(f"{path}: expected a positive integer n_hidden, got {n_hidden!r}")
+    return n_hidden
 
 
 def _run(study: Study, run: tuple[int, int]) -> dict[str, np.ndarray]:

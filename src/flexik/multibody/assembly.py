@@ -34,9 +34,9 @@ def read_spring_stiffness(path: Path | str) -> float:
     """Fitted ground spring in N m/rad; raises DataError if the file is missing or damaged."""
     calibration = read_json(path)
     stiffness = calibration.get("spring_stiffness") if isinstance(calibration, dict) else None
-    if not isinstance(stiffness, float) or not 0.0 < stiffness < math.inf:
+    if not isinstance(stiffness, float | int) or not 0.0 < stiffness < math.inf:
         raise DataError(f"{path}: expected a positive number spring_stiffness, got {stiffness!r}")
-    return stiffness
+    return float(stiffness)
 
 
 def _beam(structure: parameters.Structure, name: str) -> Beam:

@@ -1,5 +1,6 @@
 """Beams as data: section tables, masses, and their reduction to finite elements (NumPy only)."""
 
+import warnings
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -88,8 +89,10 @@ def read_section(path: Path | str) -> Section:
     """
     path = Path(path)
     try:
-        table = np.genfromtxt(path, delimiter=",", names=True, dtype=float, encoding="utf-8")
-    except (OSError, ValueError, IndexError) as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # NumPy only warns of an empty file
+            table = np.genfromtxt(path, delimiter=",", names=True, dtype=float, encoding="utf-8")
+    except (OSError, ValueError, IndexError, UserWarning) as error:
         reason = " ".join(str(error).split())
         raise DataError(f"section table {path}: cannot be read ({reason})") from None
     if table.dtype.names != SECTION_COLUMNS:

@@ -46,6 +46,7 @@ class Results:
     grid, selection : tables of datasets.crane.
     errors : frame of evaluation.errors.evaluate by method, `none` among them.
     published : published statistics in mm, see evaluation.errors.comparison.
+    published_sizes : n_hidden by kind of network.
     mesh_study : frame of multibody.mesh_study.
     training : a row for every restart of every network.
     studies : frame of learning.size_selection.by_size, and the chosen size, by network.
@@ -58,6 +59,7 @@ class Results:
     selection: pd.DataFrame
     errors: dict[str, pd.DataFrame]
     published: pd.DataFrame
+    published_sizes: Mapping[str, int]
     mesh_study: pd.DataFrame
     training: pd.DataFrame
     studies: Mapping[str, tuple[pd.DataFrame, int]]
@@ -121,7 +123,7 @@ def _write_tables(results: Results, folder: Path) -> None:
         "Every restart of every network: root mean square errors of the normalised outputs on the "
         "training grid and on the selection set, which chooses. The selection error can be the "
         "smaller: the grid puts many samples at the ends of strokes and payload, where networks "
-        "fit worst; the selection set is spread evenly inside."
+        "fit worst; the selection set is drawn uniformly."
     )
     decimals = {"training error": 4, "selection error": 4}
     training = results.training.rename(columns=lambda name: name.replace("_", " "))
@@ -169,7 +171,7 @@ def _write_sizes_table(results: Results, name: str, sizes: pd.DataFrame, folder:
     )
     n_hidden = list(sizes["n_hidden"])
     chosen = results.studies[name][1]
-    notes = [f"chosen: {chosen}, published: {_published_size(results.crane, name)}"]
+    notes = [f"chosen: {chosen}, published: {_published_size(results, name)}"]
     if chosen in (n_hidden[0], n_hidden[-1]):
         notes.append(
             "The choice lies at the end of the range: a wider range may have a better size."
@@ -179,11 +181,9 @@ def _write_sizes_table(results: Results, name: str, sizes: pd.DataFrame, folder:
     tables.write_table(folder / "size_selection" / name, table, decimals, caption, notes)
 
 
-def _published_size(crane: parameters.Crane, name: str) -> int | None:
-    """n_hidden of the network with a given size of the same kind, the published one."""
-    kind = crane.selected_networks[name].kind
-    sizes = [network.n_hidden for network in crane.networks.values() if network.kind == kind]
-    return sizes[0] if sizes else None
+def _published_size(results: Results, name: str) -> int | None:
+    """Published n_hidden of the kind of network `name`; None if there is none."""
+    return results.published_sizes.get(results.crane.selected_networks[name].kind)
 
 
 def _write_figures(results: Results, folder: Path) -> None:
@@ -203,7 +203,7 @@ def _write_figures(results: Results, folder: Path) -> None:
     for name, (sizes, chosen) in results.studies.items():
         path = folder / f"size_selection_{name}.png"
         published, tolerance = (
-            _published_size(crane, name),
+            _published_size(results, name),
             crane.selected_networks[name].select.tolerance,
         )
         learning_figures.size_selection(path, sizes, chosen, published, tolerance)
