@@ -30,12 +30,13 @@ def residuals_and_jacobian(case: Case) -> tuple[Callable[[Array], Array], Callab
     (q, n), (h, columns) = targets.shape, case.start[0].shape
 
     def residuals(vector: Array) -> Array:
-        _, outputs = forward(unflatten(vector, case.start), ACTIVATION, inputs)
+        weights = unflatten(vector, case.start)
+        outputs = weights[-1] @ forward(weights, ACTIVATION, inputs)[-1]
         return (outputs - targets).ravel()
 
     def jacobian(vector: Array) -> Array:
         weights = unflatten(vector, case.start)
-        layers, _ = forward(weights, ACTIVATION, inputs)
+        layers = forward(weights, ACTIVATION, inputs)
         hidden = layers[1][:-1].T
         products = ((1.0 - hidden * hidden)[:, :, None] * inputs.T[:, None, :]).reshape(n, -1)
         full = np.zeros((q, n, len(vector)))
