@@ -79,45 +79,19 @@ def compute_table(
     """
     path, folder = Path(path), Path(folder)
     with _sole_run(folder):
-        return _compute(
-            path,
-            function,
-            parts,
-            fields,
-            parameters_checksum,
-            key,
-            settings,
-            description,
-            folder,
-            metadata,
-        )
-
-
-def _compute(
-    path: Path,
-    function: Callable[[T], Mapping[str, np.ndarray]],
-    parts: Sequence[T],
-    fields: Sequence[Field],
-    parameters_checksum: str,
-    key: str,
-    settings: ParallelSettings,
-    description: str,
-    folder: Path,
-    metadata: Mapping[str, str] | None,
-) -> int:
-    files = _part_files(folder, key, len(parts))
-    missing = [
-        i
-        for i, file in enumerate(files)
-        if not _is_finished(file, fields, parameters_checksum, key)
-    ]
-    with contextlib.closing(
-        parallel_unordered(function, parts, missing, settings, description)
-    ) as results:
-        for i, columns in results:
-            write_table(files[i], columns, fields, parameters_checksum, {"key": key})
-    concatenate_tables(files, path, fields, parameters_checksum, metadata)
-    _clean(path, folder)
+        files = _part_files(folder, key, len(parts))
+        missing = [
+            i
+            for i, file in enumerate(files)
+            if not _is_finished(file, fields, parameters_checksum, key)
+        ]
+        with contextlib.closing(
+            parallel_unordered(function, parts, missing, settings, description)
+        ) as results:
+            for i, columns in results:
+                write_table(files[i], columns, fields, parameters_checksum, {"key": key})
+        concatenate_tables(files, path, fields, parameters_checksum, metadata)
+        _clean(path, folder)
     return len(parts) - len(missing)
 
 
