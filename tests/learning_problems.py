@@ -22,7 +22,6 @@ def some_problem(
     activation: str = "tanh",
     seed: int = 0,
     selection: bool = False,
-    **options,
 ) -> tuple[Weights, Problem]:
     """Smooth data with a little noise, and Nguyen-Widrow weights."""
     generator = np.random.default_rng(seed)
@@ -36,7 +35,7 @@ def some_problem(
     start = initial_weights(p, hidden, q, activation, np.random.default_rng(seed))
     # the training data come first, the selection data do not change them
     inputs, targets = data(n)
-    return start, problem(activation, inputs, targets, data(n) if selection else None, **options)
+    return start, problem(activation, inputs, targets, data(n) if selection else None)
 
 
 def outputs(vector: torch.Tensor, like: Weights, activation: str, inputs: np.ndarray):

@@ -67,12 +67,40 @@ def test_the_error_falls_at_every_step(seed, activation, trainer, hidden):
 
 @every_trainer
 @pytest.mark.parametrize("hidden", HIDDEN)
-def test_training_does_not_depend_on_the_chunk_length(trainer, hidden):
-    runs = [
-        minimise(*some_problem(hidden=hidden, chunk_length=length), trainer(n_iterations=10))
-        for length in (1000, 7)
-    ]
-    np.testing.assert_allclose(runs[1].errors, runs[0].errors, rtol=1e-9)
+def test_chunks_do_not_change_a_short_run(trainer, hidden, monkeypatch):
+    limits = trainer(n_iterations=10)
+    whole = minimise(*some_problem(hidden=hidden), limits)
+    monkeypatch.setattr("flexik.learning.problem.CHUNK_LENGTH", 7)
+    np.testing.assert_allclose(
+        minimise(*some_problem(hidden=hidden), limits).errors, whole.errors, rtol=1e-9
+    )
+
+
+@every_trainer
+@every_activation
+@pytest.mark.parametrize("seed", [1, 2])
+def test_chunks_do_not_change_the_minimum(trainer, activation, seed, monkeypatch):
+    def run():
+        teacher, problem = taught(activation, seed, n=80, noise=0.01)
+        shift = np.random.default_rng(seed).normal(size=flatten(teacher).size)
+        limits = trainer(n_iterations=2000, minimum_progress=0.0, minimum_gradient=1e-10)
+        return minimise(moved(teacher, 0.05 * shift), problem, limits).errors
+
+    whole = run()
+    monkeypatch.setattr("flexik.learning.problem.CHUNK_LENGTH", 7)
+    assert run()[-1] == pytest.approx(whole[-1], rel=1e-9)
+
+
+@every_trainer
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_what_is_remembered_changes_no_bit(trainer, hidden, monkeypatch):
+    limits = trainer(n_iterations=60, minimum_progress=0.0)
+    monkeypatch.setattr("flexik.learning.problem.CHUNK_LENGTH", 7)
+    remembered = minimise(*some_problem(hidden=hidden), limits)
+    monkeypatch.setattr("flexik.learning.problem._REMEMBERED", 0)
+    again = minimise(*some_problem(hidden=hidden), limits)
+    assert again.errors == remembered.errors
+    assert np.array_equal(flatten(again.weights), flatten(remembered.weights))
 
 
 @every_activation

@@ -48,11 +48,12 @@ def test_the_form_for_one_hidden_layer_agrees_with_that_for_any(activation, p, q
 
 @pytest.mark.parametrize("hidden", [(4,), (4, 3)])
 @pytest.mark.parametrize("chunk_length", [1, 7, 39, 40, 1000])
-def test_chunks_change_rounding_alone(hidden, chunk_length):
-    # the reference chunk holds all 40 samples
-    weights, whole = some_problem(hidden=hidden, chunk_length=40)
-    expected = normal_equations(weights, whole)
-    found = normal_equations(weights, some_problem(hidden=hidden, chunk_length=chunk_length)[1])
+def test_chunks_change_rounding_alone(hidden, chunk_length, monkeypatch):
+    # by default one chunk holds all 40 samples
+    weights, problem = some_problem(hidden=hidden)
+    expected = normal_equations(weights, problem)
+    monkeypatch.setattr("flexik.learning.problem.CHUNK_LENGTH", chunk_length)
+    found = normal_equations(*some_problem(hidden=hidden))
     for name in ("hidden", "mixed", "output", "gradient"):
         block = getattr(expected, name)
         np.testing.assert_allclose(

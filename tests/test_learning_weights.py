@@ -77,17 +77,19 @@ def test_second_derivative_against_autograd(activation, p, hidden, q):
 
 
 @pytest.mark.parametrize("chunk_length", [1, 7, 39, 40, 1000])
-def test_chunks_change_rounding_alone(chunk_length):
-    weights, whole = some_problem(hidden=(4, 3), chunk_length=40)
-    _, chunked = some_problem(hidden=(4, 3), chunk_length=chunk_length)
-    assert chunked.mean_squared_error(weights) == pytest.approx(
-        whole.mean_squared_error(weights), rel=1e-14
-    )
-    direction = moved(weights, flatten(weights))
-    for expected, found in [
-        (whole.gradient(weights)[1], chunked.gradient(weights)[1]),
-        (whole.bending(weights, direction), chunked.bending(weights, direction)),
-    ]:
+def test_chunks_change_rounding_alone(chunk_length, monkeypatch):
+    def results():
+        weights, problem = some_problem(hidden=(4, 3))
+        direction = moved(weights, flatten(weights))
+        gradient, bending = problem.gradient(weights)[1], problem.bending(weights, direction)
+        return problem.mean_squared_error(weights), gradient, bending
+
+    # by default one chunk holds all 40 samples
+    whole_error, *whole = results()
+    monkeypatch.setattr("flexik.learning.problem.CHUNK_LENGTH", chunk_length)
+    error, *chunked = results()
+    assert error == pytest.approx(whole_error, rel=1e-14)
+    for expected, found in zip(whole, chunked, strict=True):
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
 
 

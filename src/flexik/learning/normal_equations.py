@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotrs, dtrtrs
 
 from flexik.learning.perceptron import Array
-from flexik.learning.problem import Problem
+from flexik.learning.problem import Problem, chunk_length
 from flexik.learning.weights import Weights
 
 
@@ -102,7 +102,7 @@ def _one_hidden_layer(weights: Weights, problem: Problem) -> NormalEquations:
     # hidden outputs and 1; errors] holds every block, and the output weights only scale it.
     (h, n_columns), q = weights[0].shape, len(weights[1])
     m, k = h * n_columns, h + 1
-    rows = np.empty((m + k + q, min(problem.chunk_length, problem.targets.shape[1])))
+    rows = np.empty((m + k + q, chunk_length(problem.targets.shape[1])))
     # a view: first the contiguous buffer is cut into (h, p + 1, c), then to the chunk
     products = rows[:m].reshape(h, n_columns, -1)
     gram = np.zeros((m + k + q, m + k + q))
@@ -123,7 +123,7 @@ def _one_hidden_layer(weights: Weights, problem: Problem) -> NormalEquations:
 
 def _any_layers(weights: Weights, problem: Problem) -> NormalEquations:
     m, k, q = sum(w.size for w in weights[:-1]), weights[-1].shape[1], len(weights[-1])
-    rows = np.empty((m + k + 1, min(problem.chunk_length, problem.targets.shape[1])))
+    rows = np.empty((m + k + 1, chunk_length(problem.targets.shape[1])))
     grams = np.zeros((q, m + k + 1, m + k + 1))
     for chunk in problem.chunks(weights):
         block, errors = rows[:, : chunk.inputs.shape[1]], chunk.errors(weights)

@@ -10,7 +10,8 @@ import numpy as np
 from flexik.learning.perceptron import Array
 from flexik.learning.weights import Weights, backward, forward, second_derivative, slopes_of
 
-# samples in work at once, at most: bounds memory, and longer chunks leave the cache
+# Samples in work at once, at most: bounds memory, and longer chunks leave the cache. No setting,
+# because sums are rounded chunk by chunk, and a long run makes much of the last digit.
 CHUNK_LENGTH = 1280
 # values of hidden layers that are remembered from one pass to the next, 32 MB
 _REMEMBERED = 4_000_000
@@ -53,14 +54,12 @@ class Problem:
     inputs : (p + 1, n), normalised, the last row 1
     targets : (q, n), normalised
     selection : inputs and targets of the same form the training does not see, if any
-    chunk_length : samples in work at once, at most; changes rounding alone
     """
 
     activation: str
     inputs: Array
     targets: Array
     selection: tuple[Array, Array] | None = None
-    chunk_length: int = CHUNK_LENGTH
     # the last hidden weights and their chunks, or nothing
     _memory: list[tuple[Weights, list[Chunk]]] = field(default_factory=list, init=False, repr=False)
 
@@ -112,13 +111,16 @@ class Problem:
         return product
 
     def _new_chunks(self, weights: Weights, inputs: Array, targets: Array) -> Iterator[Chunk]:
-        n = targets.shape[1]
-        # chunks of equal length, none of a few samples only
-        length = math.ceil(n / math.ceil(n / self.chunk_length))
+        n, length = targets.shape[1], chunk_length(targets.shape[1])
         for first in range(0, n, length):
             part = slice(first, first + length)
             layers = forward(weights, self.activation, inputs[:, part])
             yield Chunk(inputs[:, part], targets[:, part], layers, self.activation)
+
+
+def chunk_length(n: int) -> int:
+    """Samples in each of the equal chunks of `n` samples; the last may be a little shorter."""
+    return math.ceil(n / math.ceil(n / CHUNK_LENGTH))
 
 
 def problem(
@@ -126,13 +128,12 @@ def problem(
     inputs: Array,
     targets: Array,
     selection: tuple[Array, Array] | None = None,
-    chunk_length: int = CHUNK_LENGTH,
 ) -> Problem:
     """Problem of normalised samples: inputs (n, p), targets (n, q), selection of the same form."""
     if selection is not None:
         selection = _with_bias(selection[0]), np.ascontiguousarray(selection[1].T)
     targets = np.ascontiguousarray(targets.T)
-    return Problem(activation, _with_bias(inputs), targets, selection, chunk_length)
+    return Problem(activation, _with_bias(inputs), targets, selection)
 
 
 def _with_bias(inputs: Array) -> Array:
