@@ -44,15 +44,13 @@ def step_flops(n: int, p: int, h: int, q: int) -> float:
 
     Half of the products of the symmetric J^T J, each distinct one of two inputs once for two
     hidden units, and the output block once for the refit and the next step; forward pass, second
-    derivative and J^T r of the acceleration; Cholesky factor with the output block eliminated. The
-    second step adds a refit, gradient, forward pass and factor.
+    derivative and J^T r of the acceleration; Cholesky factor with the output block eliminated.
     """
     c, k, m = p + 1, h + 1, h * (p + 1)
     gram = h * (h + 1) / 2 * c * (c + 1) / 2 + m * k + k * (k + 1) / 2 + q * (m + k)
     passes = (m + q * k) + (m + 2 * q * h) + (q * k + q * h + m)
-    second = (k * (k + 1) / 2 + q * k) + (q * k + q * h + m) + (m + q * k)
     factor = k**3 / 3 + q * m * k**2 + q * k * m**2 + m**3 / 3
-    return 2 * n * (gram + passes + second) + 2 * factor
+    return 2 * n * (gram + passes) + factor
 
 
 def dgemm_rate() -> float:

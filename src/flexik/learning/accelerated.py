@@ -1,10 +1,9 @@
 """Levenberg-Marquardt training of a perceptron, improved: a few steps do the work of many.
 
 After every step the output layer is solved again exactly (Golub and Pereyra 1973); the step
-follows the valley by its second derivative (geodesic acceleration: Transtrum and Sethna 2012); a
-second, shorter step from where it ends uses the same J^T J (modified Levenberg-Marquardt: Fan
-2012); mu follows the ratio of the actual to the predicted fall of the error (Nielsen 1999) and
-multiplies the diagonal of J^T J (Marquardt 1963).
+follows the valley by its second derivative (geodesic acceleration: Transtrum and Sethna 2012); mu
+follows the ratio of the actual to the predicted fall of the error (Nielsen 1999) and multiplies
+the diagonal of J^T J (Marquardt 1963).
 """
 
 import math
@@ -26,8 +25,6 @@ _SCALE_FLOOR = 1e-3
 _RIDGE = 1e-10
 # mu falls by this factor at most in one step
 _MU_DECREASE = 0.2
-# damping of the second step relative to that of the first: J^T J is no longer that of the point
-_SECOND_DAMPING = 100.0
 
 
 @dataclass(frozen=True)
@@ -127,25 +124,11 @@ def _descend(
             before = equations.mean_squared_error
             trial, error = with_solved_outputs(moved(point.weights, step), problem)
             # false for nan as well; a trial that fails here costs no Gram product
-            if error < before:
-                corrected = _corrected(trial, error, equations, problem, damping.mu)
-                if (better := _point_below(before, corrected, problem)) is not None:
-                    damping.decrease((before - error) / predicted if predicted > 0.0 else 0.0)
-                    return better
+            if error < before and (better := _point_below(before, trial, problem)) is not None:
+                damping.decrease((before - error) / predicted if predicted > 0.0 else 0.0)
+                return better
         damping.increase()
     return StopReason.SINGULAR if singular else StopReason.MU
-
-
-def _corrected(
-    weights: Weights, error: float, equations: NormalEquations, problem: Problem, mu: float
-) -> Weights:
-    """`weights` after a second step with the J^T J of the first, if that lowers the error."""
-    factor = equations.factor(_SECOND_DAMPING * mu, equations.scale(_SCALE_FLOOR))
-    if factor is None:
-        return weights
-    step = factor.solve(-0.5 * problem.targets.size * problem.gradient(weights)[1])
-    trial, error_there = with_solved_outputs(moved(weights, step), problem)
-    return trial if error_there < error else weights
 
 
 def _point_below(error: float, weights: Weights, problem: Problem) -> _Point | None:
