@@ -118,6 +118,20 @@ def test_order_of_payloads_and_starting_point_do_not_matter(crane):
     assert up[[0, -1]] == pytest.approx(np.array(alone), abs=2e-7)
 
 
+@pytest.mark.parametrize("element", ["geometrically_exact", "ancf"])
+def test_rows_do_not_depend_on_the_extensions_before_them(crane, geometry, element):
+    # neither on those that share a system nor on a failure; the last put the pad at a pin's node
+    variant = replace(crane, element=element)
+    extension = [*np.linspace(0.0, 1.6, 24), *np.linspace(1.58, 0.02, 24), 0.3, 0.32, 0.39, 0.41]
+    strokes = np.column_stack([np.full(52, 0.2), np.full(52, 0.3), extension])
+    payload = np.linspace(30.0, 500.0, 52)
+    payload[10] = 1e6
+    together, failures = solve(variant, strokes, payload)
+    assert list(failures) == [10]
+    alone = [solve(variant, strokes[k], payload[k : k + 1])[0][0] for k in range(52)]
+    np.testing.assert_array_equal(together, alone)
+
+
 def test_a_failure_is_raised_with_its_strokes_and_payload(crane):
     strokes = np.tile([0.1, 0.1, 1.0], (3, 1))
     payload = np.array([100.0, 1e6, 200.0])

@@ -7,8 +7,8 @@ from flexik import parameters
 from flexik.errors import DataError
 from flexik.files import read_json
 from flexik.mechanisms.crane import CraneGeometry
-from flexik.multibody.crane import CraneStructure, FlexibleCrane, Rod
-from flexik.multibody.structure import Beam, read_section
+from flexik.multibody.crane import FlexibleCrane
+from flexik.multibody.structure import Beam, CraneStructure, Rod, read_section
 
 
 def flexible_crane(crane: parameters.Crane, spring_stiffness: float) -> FlexibleCrane:

@@ -13,8 +13,8 @@ from exudyn import itemInterface as item
 
 from flexik.errors import SolverError
 from flexik.mechanisms.crane import CraneGeometry, CranePose, Vector, pose
-from flexik.multibody.elements import PlacedBeam, place_beam
-from flexik.multibody.structure import Array, Beam, discretise
+from flexik.multibody.elements import place_beam
+from flexik.multibody.structure import Array, CraneStructure, Elements, Rod, discretise
 
 # Newton's residual, N and N m: it falls quadratically onto a round-off floor of about 1e-4 (stiff
 # axial terms); one step after passing this tolerance the solution is on the floor
@@ -24,44 +24,10 @@ NEWTON_TOLERANCE = 1e-2
 SMALLEST_LOAD_STEP = 0.05
 
 BEAMS = ("pillar", "lift", "jib", "extension")
+# Beams whose mesh depends on the extension stroke: the pads slide on them
+SLIDING = ("jib", "extension")
 
-
-@dataclass(frozen=True)
-class Rod:
-    """A rigid two-pin link: mass in kg and distance of its centre from its first pin in m."""
-
-    mass: float
-    centre_of_mass: float
-
-
-@dataclass(frozen=True)
-class CraneStructure:
-    """What bends and weighs. Lengths in m, masses in kg.
-
-    axis_height : height of the lift and jib axes above B and G in the lift and jib frames.
-
-    The front pad sits at the end of the jib, the rear pad at the rear end of the extension.
-    """
-
-    pillar: Beam
-    lift: Beam
-    jib: Beam
-    extension: Beam
-    rocker: Rod
-    coupler: Rod
-    lift_axis_height: float
-    jib_axis_height: float
-    gravity: float
-
-    @property
-    def front_pad(self) -> float:
-        """Abscissa of the front pad, jib frame."""
-        return self.jib.span[1]
-
-    @property
-    def extension_length(self) -> float:
-        """Rear end to tip."""
-        return self.extension.span[1] - self.extension.span[0]
+Meshes = dict[str, Elements]
 
 
 @dataclass(frozen=True)
@@ -78,6 +44,11 @@ class FlexibleCrane:
     spring_stiffness: float
     element: str = "geometrically_exact"
     refinement: int = 1
+
+    def rear_pad(self, extension: float) -> float:
+        """Abscissa of the rear pad at stroke `extension`, jib frame, m."""
+        start = self.geometry.extension_start_in_jib[0]
+        return start + extension - self.structure.extension_length
 
 
 @dataclass(frozen=True)
@@ -102,17 +73,26 @@ def solve(
 ) -> tuple[Array, dict[int, SolverError]]:
     """Tip (n, 2) in m at `strokes` (n, 3) in m with `payload` (n,) in kg, and the rows that failed.
 
-    Rows in a run of equal strokes are solved one from the other; rows in a run of equal extension
-    share one system. Each run of strokes starts from the unloaded pose. A row without equilibrium
-    holds NaN and is in the second result, with an error that names its strokes and payload.
+    Rows in a run of equal strokes are solved one from the other; rows whose meshes have the same
+    layout share one system. Each run of strokes starts from the unloaded pose. A row without
+    equilibrium holds NaN and is in the second result, with an error that names its strokes and
+    payload.
     """
     strokes, payload = np.atleast_2d(strokes), np.atleast_1d(payload)
     result = np.full((len(strokes), 2), np.nan)
     failures: dict[int, SolverError] = {}
+    models: dict[tuple[tuple[int, ...], ...], CraneModel] = {}
     model: CraneModel | None = None
     for k, (row, mass) in enumerate(zip(strokes, payload, strict=True)):
         if model is None or row[2] != model.extension:
-            model = CraneModel(crane, float(row[2]))
+            extension = float(row[2])
+            meshes = _meshes(crane, extension, SLIDING)
+            layout = tuple((len(mesh.stations), *mesh.pins) for mesh in meshes.values())
+            if layout in models:
+                models[layout].extend(extension, meshes)
+            else:
+                models[layout] = CraneModel(crane, extension)
+            model = models[layout]
         try:
             if not np.array_equal(row, model.strokes):
                 model.place(row)
@@ -151,21 +131,42 @@ def reference_shapes(crane: FlexibleCrane, strokes: Sequence[float] | Array) -> 
 class CraneModel:
     """An Exudyn system for one extension stroke (m), placed at strokes and solved for payloads.
 
-    The extension fixes where the pads meet the beams, hence the mesh; lift and jib stroke only turn
-    the reference configuration, which costs far less than a new system.
+    The extension fixes where the pads meet the beams, hence the mesh. Another extension with the
+    same layout of nodes only changes elements and weights; lift and jib stroke only turn the
+    reference configuration. Both cost far less than a new system.
     """
 
     def __init__(self, crane: FlexibleCrane, extension: float) -> None:
         self.crane, self.extension = crane, extension
         self._container = exu.SystemContainer()
         self.system = self._container.AddSystem()
-        self._weights: list[tuple[int, float]] = []
-        rigid = pose(crane.geometry, np.array([[0.0, 0.0, extension]]))
-        self.beams = self._place_beams(rigid)
+        meshes = _meshes(crane, extension)
+        self.beams = {
+            name: place_beam(self.system, crane.element, mesh, np.zeros(2), 0.0)
+            for name, mesh in meshes.items()
+        }
+        self._weights = {name: self._weigh(name, mesh) for name, mesh in meshes.items()}
         self._head = self.system.AddNode(item.NodePoint2D())
         self._supports = self._support_pillar()
         self._connectors = self._connect()
-        self._payload_load = self._load()
+        tip = self.beams["extension"].marker(crane.structure.extension.span[1])
+        self._payload_load = self._add_weight(tip, 0.0)
+        self.system.Assemble()
+        self.strokes = np.full(3, np.nan)
+
+    def extend(self, extension: float, meshes: Meshes) -> None:
+        """Change to stroke `extension` in m and its `meshes` of jib and extension.
+
+        They must have as many stations as those of the model, and pins at the same ones.
+        """
+        self.extension = extension
+        for name, mesh in meshes.items():
+            self.beams[name].reshape(mesh)
+            for load, mass in zip(self._weights[name], mesh.node_mass, strict=True):
+                self._set_weight(load, mass)
+        rear_pad = self.crane.rear_pad(extension)
+        self.beams["jib"].slide(self._rear_pad, rear_pad)
+        self.beams["extension"].slide(self._front_pad, self.crane.structure.front_pad - rear_pad)
         self.strokes = np.full(3, np.nan)
 
     def place(self, strokes: Array) -> None:
@@ -186,13 +187,12 @@ class CraneModel:
             ("jib_cylinder", geometry.jib_cylinder_length + strokes[1]),
         ):
             self.system.SetObjectParameter(self._connectors[name], "distance", length)
-        self.system.Assemble()
+        self.system.AssembleInitializeSystemCoordinates()
         self._solved: list[tuple[float, Array, Array]] = []
 
     def solve(self, payload: float) -> None:
         """Find the equilibrium with `payload` in kg, starting from the last solutions."""
-        force = [0.0, -payload * self.crane.structure.gravity, 0.0]
-        self.system.SetLoadParameter(self._payload_load, "loadVector", force)
+        self._set_weight(self._payload_load, payload)
         self._predict(payload)
         try:
             solved = exu.MainSolverStatic().SolveSystem(self.system, _SETTINGS)  # type: ignore[call-arg,misc]
@@ -201,7 +201,7 @@ class CraneModel:
         data = self.system.systemData
         solution = np.array(data.GetODE2Coordinates()), np.array(data.GetAECoordinates())
         if not solved or not np.isfinite(solution[0]).all():
-            self.system.Assemble()  # back to the unloaded pose
+            self.system.AssembleInitializeSystemCoordinates()  # back to the unloaded pose
             self._solved = []
             raise SolverError(
                 f"no static equilibrium at strokes {_listed(self.strokes)} m with {payload:g} kg"
@@ -246,33 +246,11 @@ class CraneModel:
             "extension": (_shift(rigid.extension_start[0], jib, -overlap, 0.0), jib),
         }
 
-    def _place_beams(self, rigid: CranePose) -> dict[str, PlacedBeam]:
-        geometry, structure = self.crane.geometry, self.crane.structure
-        pins = {
-            "pillar": (geometry.lift_pivot[1] + geometry.lift_cylinder_base[1],),
-            "lift": (
-                geometry.lift_cylinder_head[0],
-                geometry.jib_cylinder_base_in_lift[0],
-                geometry.rocker_pivot_in_lift[0],
-            ),
-            "jib": (geometry.coupler_pin[0], 0.0, self._rear_pad),
-            "extension": (structure.front_pad - self._rear_pad,),
-        }
-        beams = {}
-        for name, frame in self._frames(rigid).items():
-            beam: Beam = getattr(structure, name)
-            elements = discretise(beam, pins[name], self.crane.refinement)
-            beams[name] = place_beam(self.system, self.crane.element, elements, *frame)
-            for abscissa, mass in zip(elements.stations, elements.node_mass, strict=True):
-                marker = beams[name].marker(abscissa, beam.mass_offset)
-                self._weights.append((marker, mass))
-        return beams
-
-    @property
-    def _rear_pad(self) -> float:
-        """Abscissa of the rear pad on the jib, m."""
-        start = self.crane.geometry.extension_start_in_jib[0]
-        return start + self.extension - self.crane.structure.extension_length
+    def _weigh(self, name: str, mesh: Elements) -> list[int]:
+        """Hang the mass of a beam on its nodes; returns the loads."""
+        beam, offset = self.beams[name], getattr(self.crane.structure, name).mass_offset
+        pairs = zip(mesh.stations, mesh.node_mass, strict=True)
+        return [self._add_weight(beam.marker(x, offset), mass) for x, mass in pairs]
 
     def _support_pillar(self) -> tuple[int, int, int]:
         """Pin the base and hold its rotation by the ground spring: connectors of x, y, rotation."""
@@ -294,12 +272,14 @@ class CraneModel:
         geometry, structure = self.crane.geometry, self.crane.structure
         extension = self.beams["extension"]
         height = geometry.extension_start_in_jib[1]
+        rear_pad = self.crane.rear_pad(self.extension)
+        self._rear_pad = self._on_jib((rear_pad, height))
+        self._front_pad = extension.marker(structure.front_pad - rear_pad)
         self._pin(self._on_pillar((0.0, 0.0)), self._on_lift((0.0, 0.0)))
         self._pin(self._on_lift(geometry.jib_pivot), self._on_jib((0.0, 0.0)))
-        self._pin(self._on_jib((self._rear_pad, height)), extension.marker(0.0))
-        sliding = extension.marker(structure.front_pad - self._rear_pad)
+        self._pin(self._rear_pad, extension.marker(0.0))
         pad = item.ObjectJointPrismatic2D(
-            markerNumbers=[sliding, self._on_jib((structure.front_pad, height))],
+            markerNumbers=[self._front_pad, self._on_jib((structure.front_pad, height))],
             constrainRotation=False,
         )
         head = self.system.AddMarker(item.MarkerNodePosition(nodeNumber=self._head))
@@ -339,18 +319,18 @@ class CraneModel:
     def _hang_rod(self, rod: Rod, length: float, first: int, second: int) -> None:
         """Put the weight of a rigid link on its two pins, which is the same for the rest."""
         share = rod.centre_of_mass / length
-        self._weights += [(first, rod.mass * (1 - share)), (second, rod.mass * share)]
+        self._add_weight(first, rod.mass * (1 - share))
+        self._add_weight(second, rod.mass * share)
 
-    def _load(self) -> int:
-        """Apply all weights; returns the load of the payload, still zero."""
-        for marker, mass in self._weights:
-            self._add_force(marker, -mass * self.crane.structure.gravity)
-        extension = self.beams["extension"]
-        return self._add_force(extension.marker(extension.stations[-1]), 0.0)
+    def _add_weight(self, marker: int, mass: float) -> int:
+        """Hang `mass` in kg on a marker; returns the load."""
+        load = self.system.AddLoad({"loadType": "ForceVector", "markerNumber": marker})
+        self._set_weight(load, mass)
+        return load
 
-    def _add_force(self, marker: int, vertical: float) -> int:
-        load = item.LoadForceVector(markerNumber=marker, loadVector=[0.0, vertical, 0.0])
-        return self.system.AddLoad(load)
+    def _set_weight(self, load: int, mass: float) -> None:
+        force = [0.0, -mass * self.crane.structure.gravity, 0.0]
+        self.system.SetLoadParameter(load, "loadVector", force)
 
     def _reaction(self) -> Array:
         x, y, moment = (self._force(number) for number in self._supports)
@@ -363,6 +343,22 @@ class CraneModel:
             return float(data.GetAECoordinates()[data.GetObjectLTGAE(connector)[0]])
         force = self.system.GetObjectOutput(connector, exu.OutputVariableType.Force)
         return float(np.atleast_1d(force)[0])
+
+
+def _meshes(crane: FlexibleCrane, extension: float, names: Sequence[str] = BEAMS) -> Meshes:
+    """Meshes of the beams `names` at stroke `extension` in m, with a node at every pin and pad."""
+    geometry, rear_pad = crane.geometry, crane.rear_pad(extension)
+    pins = {
+        "pillar": (geometry.lift_pivot[1] + geometry.lift_cylinder_base[1],),
+        "lift": (
+            geometry.lift_cylinder_head[0],
+            geometry.jib_cylinder_base_in_lift[0],
+            geometry.rocker_pivot_in_lift[0],
+        ),
+        "jib": (geometry.coupler_pin[0], 0.0, rear_pad),
+        "extension": (crane.structure.front_pad - rear_pad,),
+    }
+    return {n: discretise(getattr(crane.structure, n), pins[n], crane.refinement) for n in names}
 
 
 def _settings() -> exu.SimulationSettings:

@@ -7,17 +7,27 @@ ancf : two-node absolute nodal coordinate cable element without shear (Gerstmayr
 """
 
 from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
 
 import exudyn as exu
 import numpy as np
-from exudyn import itemInterface as item
 
-from flexik.multibody.structure import Array, Elements
+from flexik.multibody.structure import Array, Elements, nearest
 
-ELEMENTS = ("geometrically_exact", "ancf")
+# Node and element in Exudyn: dictionaries, which it takes two to three times faster than its item
+# classes, but without complaint about unknown keys
+_ITEMS: dict[str, tuple[str, dict[str, Any]]] = {
+    "geometrically_exact": (
+        "RigidBody2D",
+        {"objectType": "BeamGeometricallyExact2D", "includeReferenceRotations": True},
+    ),
+    "ancf": ("Point2DSlope1", {"objectType": "ANCFCable2D", "useReducedOrderIntegration": 1}),
+}
+ELEMENTS = tuple(_ITEMS)
 
 
-@dataclass(frozen=True)
+@dataclass
 class PlacedBeam:
     """A beam in an Exudyn system; stations (m + 1,) in m, nodes and objects as Exudyn numbers."""
 
@@ -27,27 +37,56 @@ class PlacedBeam:
     nodes: list[int]
     objects: list[int]
     _arms: dict[int, int] = field(default_factory=dict)
+    _markers: dict[int, tuple[int, float, float]] = field(default_factory=dict)
 
     def marker(self, abscissa: float, offset: float = 0.0) -> int:
         """Marker at `abscissa`, `offset` left of the axis, in m, on a rigid arm from a node."""
-        k = int(np.argmin(np.abs(self.stations - abscissa)))
-        ahead = abscissa - self.stations[k]
+        k = nearest(self.stations, abscissa)
         if self.ancf:
-            element = max(k - 1, 0)
-            body, x = self.objects[element], self.stations[k] - self.stations[element] + ahead
+            body = self.objects[max(k - 1, 0)]
         else:
             # this element offers points on its axis only: a massless body on the node is the arm
             if k not in self._arms:
-                arm = item.ObjectRigidBody2D(nodeNumber=self.nodes[k])
+                arm = {"objectType": "RigidBody2D", "nodeNumber": self.nodes[k]}
                 self._arms[k] = self.system.AddObject(arm)
-            body, x = self._arms[k], ahead
-        marker = item.MarkerBodyRigid(bodyNumber=body, localPosition=[x, offset, 0.0])
-        return self.system.AddMarker(marker)
+            body = self._arms[k]
+        marker = self.system.AddMarker({"markerType": "BodyRigid", "bodyNumber": body})
+        self._put(marker, k, abscissa - self.stations[k], offset)
+        return marker
+
+    def slide(self, marker: int, abscissa: float) -> None:
+        """Put a marker at another `abscissa` in m, on the arm from its node."""
+        k, _, offset = self._markers[marker]
+        self._put(marker, k, abscissa - self.stations[k], offset)
+
+    def _put(self, marker: int, node: int, ahead: float, offset: float) -> None:
+        """Place a marker relative to its node; bodies of ANCF markers begin at the node before."""
+        self._markers[marker] = (node, ahead, offset)
+        start = self.stations[node] - self.stations[max(node - 1, 0)] if self.ancf else 0.0
+        self.system.SetMarkerParameter(marker, "localPosition", [start + ahead, offset, 0.0])
 
     def coordinate_marker(self, node: int, coordinate: int) -> int:
         """Marker on coordinate x (0), y (1), or, small and of an upright beam, rotation (2)."""
-        marker = item.MarkerNodeCoordinate(nodeNumber=self.nodes[node], coordinate=coordinate)
-        return self.system.AddMarker(marker)
+        marker = {"markerType": "NodeCoordinate", "nodeNumber": self.nodes[node]}
+        return self.system.AddMarker({**marker, "coordinate": coordinate})
+
+    def reshape(self, elements: Elements) -> None:
+        """Take over as many other `elements`; markers stay as far from their nodes as they are."""
+        self.stations = elements.stations
+        length = np.diff(elements.stations)
+        parameters = {
+            "length": length,
+            "bendingStiffness": elements.bending_stiffness,
+            "axialStiffness": elements.axial_stiffness,
+        }
+        if not self.ancf:
+            parameters["shearStiffness"] = length / elements.residual_flexibility
+        for name, values in parameters.items():
+            for number, value in zip(self.objects, values.tolist(), strict=True):
+                self.system.SetObjectParameter(number, name, value)
+        if self.ancf:
+            for marker, place in self._markers.items():
+                self._put(marker, *place)
 
     def move(self, origin: Array, angle: float) -> None:
         """Put the reference configuration at `origin` (2,) in m and `angle` in rad."""
@@ -66,35 +105,18 @@ def place_beam(
 ) -> PlacedBeam:
     """Add a straight beam whose abscissa 0 lies at `origin` (2,) in m, axis at `angle` in rad."""
     ancf = element == "ancf"
-    node_type = item.NodePoint2DSlope1 if ancf else item.NodeRigidBody2D
-    nodes = [
-        system.AddNode(node_type(referenceCoordinates=reference))
-        for reference in _references(ancf, elements.stations, origin, angle)
-    ]
-    objects = []
-    for k, length in enumerate(np.diff(elements.stations)):
-        common = {
-            "nodeNumbers": nodes[k : k + 2],
-            "length": length,
-            "bendingStiffness": elements.bending_stiffness[k],
-            "axialStiffness": elements.axial_stiffness[k],
-        }
-        objects.append(
-            system.AddObject(
-                item.ObjectANCFCable2D(useReducedOrderIntegration=1, **common)
-                if ancf
-                else item.ObjectBeamGeometricallyExact2D(
-                    shearStiffness=length / elements.residual_flexibility[k],
-                    includeReferenceRotations=True,
-                    **common,
-                )
-            )
-        )
-    return PlacedBeam(system, ancf, elements.stations, nodes, objects)
+    node_type, element_type = _ITEMS[element]
+    nodes = [system.AddNode({"nodeType": node_type}) for _ in elements.stations]
+    objects = [system.AddObject({**element_type, "nodeNumbers": list(p)}) for p in pairwise(nodes)]
+    beam = PlacedBeam(system, ancf, elements.stations, nodes, objects)
+    beam.reshape(elements)
+    beam.move(origin, angle)
+    return beam
 
 
 def _references(ancf: bool, stations: Array, origin: Array, angle: float) -> list[list[float]]:
     """Reference coordinates of the nodes of a straight beam."""
     direction = np.array([np.cos(angle), np.sin(angle)])
     orientation = list(direction) if ancf else [angle]
-    return [[*point, *orientation] for point in origin + stations[:, None] * direction]
+    points = (origin + stations[:, None] * direction).tolist()
+    return [[*point, *orientation] for point in points]

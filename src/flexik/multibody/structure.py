@@ -1,4 +1,4 @@
-"""Beams as data: section tables, masses, and their reduction to finite elements (NumPy only)."""
+"""What bends and weighs, as data, and its reduction to finite elements (NumPy only)."""
 
 import warnings
 from dataclasses import dataclass
@@ -65,9 +65,48 @@ class Beam:
 
 
 @dataclass(frozen=True)
+class Rod:
+    """A rigid two-pin link: mass in kg and distance of its centre from its first pin in m."""
+
+    mass: float
+    centre_of_mass: float
+
+
+@dataclass(frozen=True)
+class CraneStructure:
+    """What bends and weighs. Lengths in m, masses in kg.
+
+    axis_height : height of the lift and jib axes above B and G in the lift and jib frames.
+
+    The front pad sits at the end of the jib, the rear pad at the rear end of the extension.
+    """
+
+    pillar: Beam
+    lift: Beam
+    jib: Beam
+    extension: Beam
+    rocker: Rod
+    coupler: Rod
+    lift_axis_height: float
+    jib_axis_height: float
+    gravity: float
+
+    @property
+    def front_pad(self) -> float:
+        """Abscissa of the front pad, jib frame."""
+        return self.jib.span[1]
+
+    @property
+    def extension_length(self) -> float:
+        """Rear end to tip."""
+        return self.extension.span[1] - self.extension.span[0]
+
+
+@dataclass(frozen=True)
 class Elements:
     """Finite elements of a beam: stations (m + 1,) in m, and arrays (m,) over the elements.
 
+    pins : the station nearest to each pin that was asked for.
     bending_stiffness : L / int dx/EI, N m2.
     axial_stiffness : L / int dx/EA, N.
     residual_flexibility : int (x - middle)^2 dx/EI, m/N: what an element of constant curvature
@@ -76,6 +115,7 @@ class Elements:
     """
 
     stations: Array
+    pins: tuple[int, ...]
     bending_stiffness: Array
     axial_stiffness: Array
     residual_flexibility: Array
@@ -121,10 +161,15 @@ def discretise(beam: Beam, pins: tuple[float, ...], refinement: int = 1) -> Elem
     for start, end in pairwise(stations):
         n = max(1, int(np.ceil((end - start) / longest - 1e-6)))
         mesh += list(np.linspace(start, end, n + 1)[1:])
-    return _reduce(beam, np.array(mesh))
+    return _reduce(beam, np.array(mesh), pins)
 
 
-def _reduce(beam: Beam, stations: Array) -> Elements:
+def nearest(stations: Array, abscissa: float) -> int:
+    """Number of the station nearest to `abscissa` in m."""
+    return int(np.abs(stations - abscissa).argmin())
+
+
+def _reduce(beam: Beam, stations: Array, pins: tuple[float, ...]) -> Elements:
     """Integrate section and mass over the elements between `stations`."""
     x, w, element = _quadrature(beam, stations)
     n = len(stations) - 1
@@ -144,7 +189,8 @@ def _reduce(beam: Beam, stations: Array) -> Elements:
     along = (x - stations[element]) / length[element]
     node_mass = _sums(element, slice_mass * (1 - along), n + 1)
     node_mass += _sums(element + 1, slice_mass * along, n + 1)
-    return Elements(stations, length / bending, length / axial, residual, node_mass)
+    nodes = tuple(nearest(stations, pin) for pin in pins)
+    return Elements(stations, nodes, length / bending, length / axial, residual, node_mass)
 
 
 def _sums(group: NDArray[np.int64], values: Array, n_groups: int) -> Array:
