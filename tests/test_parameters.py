@@ -1,6 +1,7 @@
 """params.yaml: what it says is valid, commented and complete, and every mistake names its key."""
 
 import copy
+import itertools
 import re
 import typing
 from pathlib import Path
@@ -68,6 +69,12 @@ def test_the_smoke_profile_is_among_the_profiles():
 
 
 DEFLECTION = "crane.networks.deflection"
+MODULAR = "crane.modular_networks.modular"
+SELECTED = "crane.selected_networks.deflection_selected"
+SELECTED_MODULAR = "crane.selected_modular_networks.modular_selected"
+TRAINER = "crane.trainers.levenberg_marquardt"
+PROPAGATION = "crane.trainers.back_propagation"
+INVERSION = "crane.methods.direct.inversion"
 WRONG = [
     # value out of range
     ("crane.structure.beams.lift.mass", -124.6),
@@ -94,10 +101,37 @@ WRONG = [
     ("crane.grid.maximum_failed_share", 1.1),
     ("crane.selection.payload", [500.0, 30.0]),
     ("crane.selection.seed", -1),
-    (f"{DEFLECTION}.trainer.mu", 0.0),
-    (f"{DEFLECTION}.trainer.mu_decrease", 1.0),
-    (f"{DEFLECTION}.trainer.mu_increase", 1.0),
+    (f"{TRAINER}.mu", 0.0),
+    (f"{TRAINER}.mu", 1.0e11),
+    (f"{TRAINER}.mu_decrease", 1.0),
+    (f"{TRAINER}.mu_increase", 1.0),
+    (f"{PROPAGATION}.minimum_rate", 0.1),
+    ("crane.trainers.accelerated.acceleration", -0.1),
+    (f"{DEFLECTION}.n_hidden", 0),
+    (f"{MODULAR}.n_restarts", 0),
+    (f"{SELECTED}.select.n_hidden.minimum", 0),
+    (f"{SELECTED}.select.n_hidden.increment", 7),
+    (f"{SELECTED}.select.tolerance", -0.1),
+    (f"{SELECTED_MODULAR}.select.n_restarts", 0),
+    ("crane.fitting.n_samples", 0),
+    ("crane.fitting.n_hidden.1", 0),
+    ("crane.fitting.jib", -0.195),
+    ("crane.workspace.n_targets", 0),
+    ("crane.workspace.x", [6.5, 0.0]),
+    ("crane.workspace.y", [1.0, 1.0]),
+    ("crane.workspace.payload", [500.0, 30.0]),
+    ("crane.workspace.payload.0", -30.0),
+    ("crane.workspace.tolerance", 0.0),
+    ("crane.workspace.n_iterations", 0),
     ("crane.methods.combined.n_corrections", 0),
+    ("crane.methods.combined.n_workspace_targets", -1),
+    ("crane.methods.inverse.n_workspace_targets", 10001),  # more than workspace.n_targets
+    (f"{INVERSION}.learning_rate", 0.0),
+    (f"{INVERSION}.tolerance", -1.0e-7),
+    (f"{INVERSION}.n_iterations", 0),
+    ("crane.methods.direct_gauss_newton.inversion.damping", 0.0),
+    ("crane.methods.modular_gauss_newton.inversion.tolerance", 0.0),
+    ("crane.tolerance_study.tolerances.1", 0.0),
     ("crane.methods.combined_ga.genetic.n_individuals", 1),
     ("crane.methods.combined_ga.genetic.n_current", 16),
     ("crane.methods.combined_ga.genetic.tolerance", 0.0),
@@ -105,21 +139,50 @@ WRONG = [
     # names that nothing goes by
     ("crane.structure.element", "timoshenko"),
     (f"{DEFLECTION}.activation", "relu"),
-    (f"{DEFLECTION}.kind", "inverse"),
-    ("crane.methods.combined.method", "direct"),
+    (f"{DEFLECTION}.kind", "correction"),  # that is learnt by modular networks alone
+    (f"{DEFLECTION}.trainer", "nothing"),
+    (f"{MODULAR}.trainer", "nothing"),
+    (f"{SELECTED}.trainer", "nothing"),
+    (f"{SELECTED}.select.trainer", "nothing"),
+    (f"{SELECTED_MODULAR}.trainer", "nothing"),
+    (f"{SELECTED_MODULAR}.select.trainer", "nothing"),
+    ("crane.fitting.trainer", "nothing"),
+    (f"{MODULAR}.rigid", "nothing"),
+    (f"{MODULAR}.rigid", "deflection"),
+    (f"{MODULAR}.rigid", "modular"),
+    (f"{SELECTED_MODULAR}.rigid", "direct_selected"),
+    (f"{TRAINER}.kind", "simplex"),
+    ("crane.methods.combined.method", "newton"),
     ("crane.methods.combined.network", "nothing"),
+    ("crane.methods.combined.network", "direct"),
+    ("crane.methods.direct.network", "modular"),
+    ("crane.methods.modular.network", "rigid"),
+    ("crane.methods.modular_selected.network", "direct_selected"),
+    ("crane.methods.inverse.network", "deflection"),
+    (f"{INVERSION}.kind", "newton"),
+    ("crane.tolerance_study.methods", ["combined"]),
+    ("crane.tolerance_study.methods.1", "inverse"),
+    ("crane.tolerance_study.methods.1", "nothing"),
     ("crane.methods.combined_ga.inverse", "newton"),
     # nothing where something is needed, or too much
     ("crane.evaluation.points", []),
     ("crane.evaluation.payloads", []),
     ("crane.networks", {}),
+    ("crane.tolerance_study.methods", []),
+    ("crane.tolerance_study.tolerances", []),
+    ("crane.fitting.n_hidden", []),
+    (INVERSION, None),
+    ("crane.methods.direct", 3),
     ("crane.geometry.lift_pivot", [1.0]),
     ("crane.geometry.lift_pivot", [1.0, 2.0, 3.0]),
     ("crane.structure.gravity", None),
     ("crane.grid.lift", [0.0, 0.5]),
     ("crane.evaluation.points.3", [1.0, 7.0]),
     # no numbers
-    (f"{DEFLECTION}.trainer.minimum_gradient", "1e-5"),
+    (f"{TRAINER}.minimum_gradient", "1e-5"),
+    (f"{INVERSION}.tolerance", "1e-7"),
+    ("crane.tolerance_study.tolerances.0", "1e-5"),
+    ("crane.methods.combined.n_workspace_targets", True),
     ("crane.calibration.stiffness_range", ["1e6", 1.0e9]),
     ("crane.geometry.lift_pivot", ["1e-3", 1.0]),
     ("crane.structure.gravity", "nan"),
@@ -135,17 +198,41 @@ WRONG = [
     # keys that are unknown or missing
     ("crane.gravity", 9.81),
     ("crane.structure.beams.lift.weight", 9.81),
-    (f"{DEFLECTION}.trainer.momentum", 0.9),
+    (f"{TRAINER}.momentum", 0.9),
+    (f"{TRAINER}.acceleration", 0.75),  # of the other schedule
+    (f"{MODULAR}.kind", "direct"),
+    (f"{SELECTED}.n_hidden", 14),
+    (f"{INVERSION}.damping", 0.01),  # of the other kind
+    ("crane.methods.combined.inversion", {}),
+    ("crane.methods.inverse.n_corrections", 1),
     ("robot", {}),
     ("crane.structure.gravity", ...),
     ("crane.structure.beams.pillar", ...),
-    (f"{DEFLECTION}.trainer.goal", ...),
+    (f"{TRAINER}.goal", ...),
+    (f"{TRAINER}.kind", ...),
+    (f"{DEFLECTION}.trainer", ...),
+    (f"{SELECTED}.select", ...),
+    (f"{SELECTED_MODULAR}.select.trainer", ...),
+    (f"{MODULAR}.rigid", ...),
+    ("crane.workspace", ...),
+    ("crane.tolerance_study", ...),
+    ("crane.modular_networks", ...),
+    ("crane.methods.combined.method", ...),
+    ("crane.methods.inverse.n_workspace_targets", ...),
+    (INVERSION, ...),
+    (f"{INVERSION}.kind", ...),
+    (f"{INVERSION}.learning_rate", ...),
     ("crane.methods.combined_ga.genetic", ...),
     ("parallel", ...),
 ]
 
-# Mistakes told by a neighbour that the key has to fit
-TOLD_BY = {"crane.grid.lift.maximum": "crane.grid.lift.increment"}
+# Mistakes told by a neighbour that the key has to fit, or by the section whose kind is wrong
+TOLD_BY = {
+    "crane.grid.lift.maximum": "crane.grid.lift.increment",
+    f"{TRAINER}.kind": TRAINER,
+    f"{INVERSION}.kind": INVERSION,
+    "crane.methods.combined.method": "crane.methods.combined",
+}
 ENTRY = re.compile(r"\.\d+")
 
 
@@ -167,10 +254,73 @@ def test_several_mistakes_are_told_at_once(original):
     ]
 
 
-def test_names_are_plain_words(original):
-    methods = original["crane"]["methods"]
-    text = mistake(changed(original, "crane.methods.My method", methods["combined"]))
-    assert "crane.methods.My method" in text
+NAMED = {
+    "networks": "deflection",
+    "modular_networks": "modular",
+    "selected_networks": "rigid_selected",
+    "selected_modular_networks": "modular_selected",
+    "methods": "combined",
+    "trainers": "study",
+}
+NETWORK_SECTIONS = [section for section in NAMED if section.endswith("networks")]
+
+
+@pytest.mark.parametrize("section", NAMED)
+def test_names_are_plain_words(original, section):
+    same = original["crane"][section][NAMED[section]]
+    text = mistake(changed(original, f"crane.{section}.My own", same))
+    assert f"crane.{section}.My own" in text
+
+
+@pytest.mark.parametrize(("section", "other"), list(itertools.permutations(NETWORK_SECTIONS, 2)))
+def test_a_network_has_one_section(original, section, other):
+    same = original["crane"][section][NAMED[section]]
+    text = mistake(changed(original, f"crane.{section}.{NAMED[other]}", same))
+    first, last = sorted((section, other), key=NETWORK_SECTIONS.index)
+    assert text == f"params.yaml: crane.{last}.{NAMED[other]}: stands under {first} too"
+
+
+@pytest.mark.parametrize("section", [*NETWORK_SECTIONS, "methods"])
+@pytest.mark.parametrize("name", ["none", "workspace", "grid", "nfiles"])
+def test_names_that_mean_something_else_are_taken(original, section, name):
+    same = original["crane"][section][NAMED[section]]
+    text = mistake(changed(original, f"crane.{section}.{name}", same))
+    assert text == f"params.yaml: crane.{section}.{name}: the name is taken"
+
+
+def test_a_network_may_have_the_name_of_a_method(original):
+    same = original["crane"]["networks"]["rigid"]
+    validate(changed(original, "crane.networks.combined_ga", same))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "known"),
+    [
+        (f"{SELECTED}.select.trainer", "fast", "levenberg_marquardt, accelerated, study, back_pr"),
+        (f"{MODULAR}.rigid", "direct", "rigid, rigid_selected"),
+        ("crane.methods.inverse.network", "direct", "of kind direct, inverse needs inverse"),
+        ("crane.methods.direct.n_workspace_targets", 20000, "there are 10000"),
+        ("crane.tolerance_study.methods.0", "inverse", "direct, modular, direct_selected, modul"),
+        (f"{INVERSION}.kind", "newton", "'gradient_descent', 'gauss_newton'"),
+        (f"{TRAINER}.kind", "simplex", "'back_propagation', 'adam', 'lbfgs'"),
+    ],
+)
+def test_a_wrong_name_comes_with_those_that_would_do(original, key, value, known):
+    assert known in mistake(changed(original, key, value))
+
+
+def test_a_kind_that_a_method_does_not_take_is_told_there(original):
+    text = mistake(changed(original, f"{DEFLECTION}.kind", "inverse"))
+    assert text.startswith("params.yaml: crane.methods.combined.network: 'deflection' is of kind")
+
+
+def test_every_network_of_the_four_sections_is_found(original):
+    crane = validate(original).crane
+    sections = [original["crane"][section] for section in NETWORK_SECTIONS]
+    assert set(crane.all_networks) == {name for section in sections for name in section}
+    assert list(crane.studies) == [*sections[2], *sections[3]]
+    for name in sections[1] | sections[3]:
+        assert crane.all_networks[name].kind == "correction"
 
 
 def test_the_value_given_is_shown(original):
@@ -184,15 +334,9 @@ def test_an_increment_that_does_not_divide_is_told(original):
 
 def test_a_missing_network_lists_those_there_are(original):
     text = mistake(changed(original, "crane.methods.combined_ga.network", "nothing"))
-    assert (
-        "crane.methods.combined_ga.network" in text and "(deflection, deflection_selected)" in text
-    )
-
-
-def test_a_method_may_not_take_the_name_of_the_uncompensated_crane(original):
-    methods = original["crane"]["methods"]
-    text = mistake(changed(original, "crane.methods.none", methods["combined"]))
-    assert "crane.methods.none" in text
+    assert text.startswith("params.yaml: crane.methods.combined_ga.network: ")
+    sections = [original["crane"][section] for section in NETWORK_SECTIONS]
+    assert f"({', '.join(name for section in sections for name in section)})" in text
 
 
 def test_values_as_yaml_reads_them_are_not_changed_on_the_way(original):

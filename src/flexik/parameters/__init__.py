@@ -1,0 +1,47 @@
+"""params.yaml as a validated model: a wrong value is one error that names its key.
+
+Every key is required, none has a default: what a stage computes follows from params.yaml alone,
+where DVC watches it. The names `size` and `nfiles` are never used: DVC's run cache ignores them.
+"""
+
+from flexik.parameters.crane import Crane
+from flexik.parameters.data import Workspace
+from flexik.parameters.methods import CombinedModel, InvertedModel, MethodModel
+from flexik.parameters.model import Model as Section
+from flexik.parameters.networks import (
+    AnyNetwork,
+    ModularNetwork,
+    NetworkModel,
+    SelectedModularNetwork,
+)
+from flexik.parameters.reading import (
+    PARAMETERS_FILE,
+    Parameters,
+    load_parameters,
+    overlay,
+    parameters_checksum,
+    read_yaml,
+    validate,
+)
+from flexik.parameters.structure import Structure
+
+__all__ = [
+    "PARAMETERS_FILE",
+    "AnyNetwork",
+    "CombinedModel",
+    "Crane",
+    "InvertedModel",
+    "MethodModel",
+    "ModularNetwork",
+    "NetworkModel",
+    "Parameters",
+    "Section",
+    "SelectedModularNetwork",
+    "Structure",
+    "Workspace",
+    "load_parameters",
+    "overlay",
+    "parameters_checksum",
+    "read_yaml",
+    "validate",
+]

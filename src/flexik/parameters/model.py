@@ -1,0 +1,55 @@
+"""What the sections of params.yaml are made of: a strict base model and kinds of numbers."""
+
+from collections.abc import Iterator
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Count = Annotated[int, Field(ge=1)]
+Seed = Annotated[int, Field(ge=0)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Vector = tuple[float, float]
+Interval = tuple[float, float]
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$")]
+
+
+class Model(BaseModel):
+    """Base of all sections: frozen, unknown keys refused, numbers finite and not from text."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=False, allow_inf_nan=False, coerce_numbers_to_str=False
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_text_numbers(cls, data: Any) -> Any:
+        # YAML 1.1 reads 1e-5 as text, which pydantic would turn into a number behind one's back
+        if isinstance(data, dict):
+            for key, value in data.items():
+                for entry in _entries(value):
+                    if isinstance(entry, bool):
+                        raise ValueError(f"{key}: expected no truth value, got {entry!r}")
+                    if isinstance(entry, str) and _is_number(entry):
+                        raise ValueError(
+                            f"{key}: {entry!r} is no YAML number (write 1.0e-5, 1.0e+6)"
+                        )
+        return data
+
+
+def _entries(value: Any) -> Iterator[Any]:
+    """`value`, or the entries of lists however deep."""
+    if isinstance(value, list):
+        for entry in value:
+            yield from _entries(entry)
+    else:
+        yield value
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
