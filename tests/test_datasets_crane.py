@@ -1,11 +1,11 @@
-"""Grid and random samples of the crane, their statuses, and what their checksums cover."""
+"""Grid and random samples of the crane, and their statuses."""
 
+import functools
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -24,23 +24,18 @@ from flexik.datasets.crane import (
     failed_samples,
     generate,
     kept,
+    parallel_tips,
     random_samples,
     solve_samples,
     split,
 )
 from flexik.datasets.parallel import ParallelSettings
-from flexik.datasets.provenance import (
-    evaluation_checksum,
-    grid_checksum,
-    network_checksum,
-    selection_checksum,
-)
 from flexik.datasets.tables import read_table
-from flexik.errors import ParameterError
+from flexik.errors import ParameterError, SolverError
 from flexik.mechanisms.crane import forward
 from flexik.multibody.assembly import flexible_crane
 from flexik.multibody.crane import tips
-from flexik.parameters import load_parameters, validate
+from flexik.parameters import load_parameters
 
 ROOT = Path(__file__).parents[1]
 SPRING = 8e6  # N m/rad
@@ -218,80 +213,38 @@ def test_generated_tables_are_the_same_for_one_and_two_workers(crane, mixed, tmp
     assert table["status"].tolist() == [KEPT, LEFT_OUT, FAILED, KEPT, KEPT]
 
 
-# Keys of params.yaml changed one at a time, and the checksums each must change
-GRID, SELECTION, NETWORK = "grid", "selection", "network"
-NONE, COMBINED, GA = "none", "combined", "combined_ga"
-CHOSEN = "combined_selected"
-EVERYTHING = {GRID, SELECTION, NETWORK, NONE, COMBINED, GA, CHOSEN}
-COVERED = {
-    "geometry.rocker_length": EVERYTHING,
-    "structure.gravity": EVERYTHING,
-    "structure.beams.jib.n_elements": EVERYTHING,
-    "grid.lift.increment": EVERYTHING - {NONE, SELECTION},
-    "grid.minimum_tip_x": EVERYTHING - {NONE},
-    "selection.seed": EVERYTHING - {GRID, NONE},
-    "networks.deflection.n_hidden": {NETWORK, COMBINED, GA},
-    "networks.deflection.trainer.mu": {NETWORK, COMBINED, GA},
-    "selected_networks.deflection_selected.seed": {CHOSEN},
-    "selected_networks.deflection_selected.select.n_hidden.maximum": {CHOSEN},
-    "evaluation.payloads.0": {NONE, COMBINED, GA, CHOSEN},
-    "methods.combined.n_corrections": {COMBINED},
-    "methods.combined_ga.n_corrections": {GA},
-    "methods.combined_ga.genetic.seed": {GA},
-    "calibration.stiffness_range.0": set(),
-    "mesh_study.seed": set(),
-    "illustration.payload": set(),
-}
+@pytest.fixture(scope="module")
+def commanded(geometry):
+    """Three extensions and one kept by chance, in no order, a sample twice."""
+    samples = random_samples(geometry, 7, (30.0, 500.0), 0.0, seed=3)
+    strokes, payload = samples.strokes.copy(), samples.payload.copy()
+    strokes[[0, 3, 5], 2], strokes[[1, 4], 2], strokes[[2], 2] = 0.8, 0.0, 1.6
+    return np.vstack([strokes, strokes[3:4]]), np.append(payload, payload[3])
 
 
-def checksums(data, spring=SPRING):
-    crane = validate(data).crane
-    return {
-        GRID: grid_checksum(crane, spring),
-        SELECTION: selection_checksum(crane, spring),
-        NETWORK: network_checksum(crane, spring, "deflection"),
-        **{
-            label: evaluation_checksum(crane, spring, label)
-            for label in (NONE, COMBINED, GA, CHOSEN)
-        },
-    }
+@pytest.mark.parametrize("n_workers", [1, 2])
+def test_parallel_tips_are_the_tips_in_their_order(crane, commanded, n_workers, monkeypatch):
+    monkeypatch.setattr("flexik.datasets.crane.split", functools.partial(split, n_rows=3))
+    strokes, payload = commanded
+    found = parallel_tips(crane, strokes, payload, ParallelSettings(n_workers))
+    alone = [tips(crane, strokes[[i]], payload[[i]])[0] for i in range(len(payload))]
+    assert found == pytest.approx(np.array(alone), abs=2e-7)
+    assert np.array_equal(found[3], found[-1])
+    order = np.random.default_rng(5).permutation(len(payload))
+    again = parallel_tips(crane, strokes[order], payload[order], ParallelSettings(n_workers))
+    assert np.array_equal(again, found[order])
 
 
-def raw():
-    return yaml.safe_load((ROOT / "params.yaml").read_text())
+def test_parallel_tips_of_nothing_are_none(crane):
+    found = parallel_tips(crane, np.empty((0, 3)), np.empty(0), ParallelSettings(1))
+    assert found.shape == (0, 2)
 
 
-@pytest.mark.parametrize("key", COVERED)
-def test_checksums_change_exactly_with_what_they_cover(key):
-    data = raw()
-    before = checksums(data)
-    *path, last = key.split(".")
-    section = data["crane"]
-    for name in path:
-        section = section[name]
-    last = int(last) if isinstance(section, list) else last
-    section[last] = section[last] * 2 if last != "increment" else section[last] / 2
-    if key == "grid.minimum_tip_x":
-        section[last] = 0.5
-    after = checksums(data)
-    assert {name for name in after if after[name] != before[name]} == COVERED[key]
-
-
-def test_every_section_of_the_crane_is_covered_or_stands_apart():
-    assert {key.partition(".")[0] for key in COVERED} == set(raw()["crane"])
-
-
-def test_all_checksums_cover_the_spring_and_differ():
-    before, after = checksums(raw()), checksums(raw(), np.nextafter(SPRING, 0))
-    assert all(before[name] != after[name] for name in before)
-    assert len(set(before.values())) == len(before)
-
-
-def test_the_order_of_keys_does_not_matter():
-    data = raw()
-    data["crane"] = dict(reversed(data["crane"].items()))
-    data["crane"]["grid"] = dict(reversed(data["crane"]["grid"].items()))
-    assert checksums(data) == checksums(raw())
+def test_parallel_tips_tell_a_row_without_equilibrium(crane, commanded):
+    strokes, payload = commanded
+    heavy = np.where(np.arange(len(payload)) == 2, 1e7, payload)
+    with pytest.raises(SolverError):
+        parallel_tips(crane, strokes, heavy, ParallelSettings(1))
 
 
 def test_strokes_that_do_not_assemble_fail_and_are_not_left_out(crane):

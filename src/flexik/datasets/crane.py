@@ -10,12 +10,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from flexik.datasets.parallel import ParallelSettings
+from flexik.datasets.parallel import ParallelSettings, parallel_map
 from flexik.datasets.resumable import compute_table
 from flexik.datasets.tables import Field
 from flexik.errors import ParameterError
 from flexik.mechanisms.crane import CraneGeometry, forward
-from flexik.multibody.crane import FlexibleCrane, solve
+from flexik.multibody.crane import FlexibleCrane, solve, tips
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,8 @@ FIELDS = (
     Field("tip_y", "m", "tip in static equilibrium; NaN where not solved"),
     Field("status", "1", "0 kept, 1 left out (rigid tip behind the limit), 2 failed", "int64"),
 )
-INPUTS = ("lift_stroke", "jib_stroke", "extension_stroke", "payload")
+STROKES = ("lift_stroke", "jib_stroke", "extension_stroke")
+INPUTS = (*STROKES, "payload")
 
 # Poses in a part: large enough to pay for one model, small enough to share out and to lose
 POSES_PER_PART = 27
@@ -122,7 +123,7 @@ def random_samples(
     return Samples(strokes[:n_samples], rng.uniform(*payload, n_samples))
 
 
-def split(samples: Samples, n_rows: int = 100) -> list[Samples]:
+def split(samples: Samples, n_rows: int = 400) -> list[Samples]:
     """`samples` in parts of `n_rows`."""
     cuts = range(0, len(samples), n_rows)
     return [Samples(samples.strokes[k : k + n_rows], samples.payload[k : k + n_rows]) for k in cuts]
@@ -140,6 +141,30 @@ def solve_samples(crane: FlexibleCrane, minimum_tip_x: float, samples: Samples) 
     status[rows[list(failures)]] = FAILED
     columns = [*samples.strokes.T, samples.payload, *rigid.T, *tips.T, status]
     return {field.name: column for field, column in zip(FIELDS, columns, strict=True)}
+
+
+def parallel_tips(
+    crane: FlexibleCrane,
+    strokes: Array,
+    payload: Array,
+    settings: ParallelSettings,
+    description: str = "",
+) -> Array:
+    """Tip (n, 2) in m at `strokes` (n, 3) in m under `payload` (n,) in kg, in parallel.
+
+    Raises the SolverError of the first row without equilibrium.
+    """
+    # rows of equal extension share a system
+    order = np.lexsort((payload, *strokes.T))
+    parts = split(Samples(strokes[order], payload[order]))
+    solved = parallel_map(functools.partial(_tips, crane), parts, settings, description)
+    result = np.empty((len(strokes), 2))
+    result[order] = np.concatenate([np.empty((0, 2)), *solved])
+    return result
+
+
+def _tips(crane: FlexibleCrane, samples: Samples) -> Array:
+    return tips(crane, samples.strokes, samples.payload)
 
 
 def generate(

@@ -21,6 +21,19 @@ CONDITION_FIELDS = (
     Field("error", "m", "length of the error"),
     Field("status", "1", "0 reached, else see flexik.positioning.method", "int64"),
 )
+TARGET_FIELDS = CONDITION_FIELDS[1:4] + tuple(
+    Field(name, "m", "puts the loaded tip on the target")
+    for name in ("lift_stroke", "jib_stroke", "extension_stroke")
+)
+TOLERANCE_FIELDS = (
+    Field("method", "1", "name of the method", "string"),
+    Field("tolerance", "1", "half the sum of squared normalised errors at which a search ends"),
+    Field("mean_error", "m", "over all test conditions"),
+    Field("max_error", "m", "over all test conditions"),
+    Field("mean_iterations", "1", "of the search"),
+    Field("max_iterations", "1", "of the search", "int64"),
+    Field("n_failed", "1", "searches that ended above their tolerance", "int64"),
+)
 
 
 def write_evaluation(path: Path | str, frame: pd.DataFrame, parameters_checksum: str) -> None:

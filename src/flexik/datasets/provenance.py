@@ -22,29 +22,75 @@ def selection_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
 
 def network_checksum(crane: parameters.Crane, spring_stiffness: float, name: str) -> str:
     """Checksum of everything that determines network `name`."""
-    network = crane.any_network(name)
-    if network is None:
-        raise ParameterError(f"crane.networks: there is no {name!r}")
-    return checksum(
+    networks = crane.all_networks
+    if name not in networks:
+        raise ParameterError(f"crane: there is no network {name!r} ({', '.join(networks)})")
+    network = networks[name]
+    sections: list[parameters.Section] = [network, crane.trainers[network.trainer]]
+    if name in crane.studies:
+        sections.append(crane.trainers[crane.studies[name].select.trainer])
+    parts = [
         grid_checksum(crane, spring_stiffness),
         selection_checksum(crane, spring_stiffness),
-        parameters_checksum([network]),
-    )
+        parameters_checksum(sections),
+    ]
+    if isinstance(network, parameters.ModularNetwork | parameters.SelectedModularNetwork):
+        parts.append(network_checksum(crane, spring_stiffness, network.rigid))
+    return checksum(*parts)
+
+
+def fitting_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
+    """Checksum of everything that determines the networks on a thinned grid."""
+    sections: list[parameters.Section] = [crane.fitting, crane.trainers[crane.fitting.trainer]]
+    return checksum(grid_checksum(crane, spring_stiffness), parameters_checksum(sections))
 
 
 def evaluation_checksum(crane: parameters.Crane, spring_stiffness: float, label: str) -> str:
     """Checksum of everything that determines the errors of method `label`."""
-    parts = [
+    sections: list[parameters.Section] = [crane.evaluation]
+    return checksum(*_method_parts(crane, spring_stiffness, label, sections))
+
+
+def targets_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
+    """Checksum of everything that determines the random targets of the workspace."""
+    return checksum(
         _model_checksum(crane, spring_stiffness),
-        parameters_checksum([crane.evaluation]),
-    ]
+        parameters_checksum([crane.workspace]),
+        repr(crane.grid.minimum_tip_x),
+    )
+
+
+def workspace_checksum(crane: parameters.Crane, spring_stiffness: float, label: str) -> str:
+    """Checksum of everything that determines the errors of method `label` over the workspace."""
+    sections: list[parameters.Section] = []
+    targets = targets_checksum(crane, spring_stiffness)
+    return checksum(targets, *_method_parts(crane, spring_stiffness, label, sections))
+
+
+def tolerance_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
+    """Checksum of everything that determines the tolerance study."""
+    sections: list[parameters.Section] = [crane.evaluation, crane.tolerance_study]
+    parts = [parameters_checksum(sections)]
+    for label in crane.tolerance_study.methods:
+        parts += _method_parts(crane, spring_stiffness, label, [])
+    return checksum(*parts)
+
+
+def _method_parts(
+    crane: parameters.Crane,
+    spring_stiffness: float,
+    label: str,
+    sections: list[parameters.Section],
+) -> list[str]:
+    """Parts of a checksum: the flexible model, `sections`, and method `label`."""
+    parts = [_model_checksum(crane, spring_stiffness), parameters_checksum(sections)]
     if label != "none":
         method = crane.methods[label]
         parts += [
             parameters_checksum([method]),
             network_checksum(crane, spring_stiffness, method.network),
         ]
-    return checksum(*parts)
+    return parts
 
 
 def _model_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
