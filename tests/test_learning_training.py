@@ -119,6 +119,21 @@ def test_the_selection_error_chooses_not_the_training_error():
     assert {r.n_restarts for r in records} == {6}
 
 
+def judge(network) -> float:
+    """Something that has nothing to do with the selection data."""
+    return float(np.abs(network.weights[1]).max())
+
+
+def test_a_judge_chooses_where_there_is_one():
+    arguments = (*data(60), *data(40, seed=1), Architecture(4), QUICK, 1, 6, INPUTS, OUTPUTS)
+    network, record, records = train_best(*arguments, process_map, judge)
+    errors = [one.selection_error for one in records]
+    assert record.selection_error == judge(network) == min(errors)
+    usual = train_best(*arguments)[2]
+    assert errors != [one.selection_error for one in usual]
+    assert [one.errors for one in records] == [one.errors for one in usual]
+
+
 @pytest.mark.parametrize("map_function", [reversed_map, process_map])
 def test_order_and_workers_do_not_matter(map_function):
     expected, result = best(), best(map_function)

@@ -19,7 +19,7 @@ from flexik.errors import DataError, TrainingError
 from flexik.files import read_json
 from flexik.learning.perceptron import Array, Quantity
 from flexik.learning.stopping import Stopping
-from flexik.learning.training import Architecture, train
+from flexik.learning.training import Architecture, Judge, train
 
 FIELDS = (
     Field("n_hidden", "1", "neurons in the hidden layer", "int64"),
@@ -45,6 +45,7 @@ class Study:
     seed: int
     input_quantities: Sequence[Quantity]
     output_quantities: Sequence[Quantity]
+    judge: Judge | None = None
 
 
 def run_study(
@@ -129,6 +130,7 @@ def _run(study: Study, run: tuple[int, int]) -> dict[str, np.ndarray]:
             study.output_quantities,
             (study.selection_inputs, study.selection_outputs),
             restart,
+            study.judge,
         )
         row = (
             n_hidden,

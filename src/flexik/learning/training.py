@@ -49,6 +49,10 @@ __all__ = [
 ]
 
 
+# Selection error of a network where the error of its outputs is not what counts
+Judge = Callable[[Network], float]
+
+
 @dataclass(frozen=True)
 class Trainer:
     """Settings of a trainer, and its function of start, problem, settings and generator."""
@@ -126,7 +130,8 @@ class TrainingRecord:
         one; empty when the run gave no usable network
     kept : the iteration the network is of; the last one unless the errors rose or the settings
         asked for selection patience
-    selection_error : root mean square of the normalised output errors on the selection data
+    selection_error : root mean square of the normalised output errors on the selection data, or
+        what the judge of the run says
     n_restarts : number of runs this one competed with, itself among them
     seconds : wall time of the run; nan when read from a file, and no part of equality
     """
@@ -154,6 +159,7 @@ class _Task:
     n_restarts: int
     quantities: tuple[tuple[Quantity, ...], tuple[Quantity, ...]]
     selection: tuple[Array, Array] | None
+    judge: Judge | None
 
 
 def train(
@@ -166,6 +172,7 @@ def train(
     output_quantities: Sequence[Quantity],
     selection: tuple[Array, Array] | None = None,
     restart: int = 0,
+    judge: Judge | None = None,
 ) -> tuple[Network, TrainingRecord]:
     """Train one network; the same as restart `restart` of `train_best`.
 
@@ -176,6 +183,7 @@ def train(
     seed : not negative
     input_quantities, output_quantities : names and units of the p and q columns
     selection : inputs (m, p) and outputs (m, q) the training does not see, if any
+    judge : gives the selection error, else that of the normalised outputs on `selection`
 
     Raises
     ------
@@ -191,7 +199,9 @@ def train(
         selection = _checked_pair("selection", *selection, quantities)
     elif settings.selection_patience is not None:
         raise TrainingError("trainer setting selection_patience needs selection data")
-    task = _Task(*data, architecture, settings, _checked_seed(seed), 1, quantities, selection)
+    task = _Task(
+        *data, architecture, settings, _checked_seed(seed), 1, quantities, selection, judge
+    )
     _check_size(task)
     network, record = _run(task, restart)
     if network is None:
@@ -211,6 +221,7 @@ def train_best(
     input_quantities: Sequence[Quantity],
     output_quantities: Sequence[Quantity],
     map_function: Callable[[Callable, Iterable], Iterable] = map,
+    judge: Judge | None = None,
 ) -> tuple[Network, TrainingRecord, list[TrainingRecord]]:
     """Train from `n_restarts` starts and keep the network with the least selection error.
 
@@ -224,6 +235,7 @@ def train_best(
     settings : of one of TRAINERS
     map_function : ``map_function(function, items)`` gives the results in any order; `function`
         can be pickled, so it may run in other processes without changing the result
+    judge : as for `train`
 
     Returns
     -------
@@ -241,7 +253,7 @@ def train_best(
     data = _checked_pair("training", inputs, outputs, quantities)
     selection = _checked_pair("selection", selection_inputs, selection_outputs, quantities)
     seed = _checked_seed(seed)
-    task = _Task(*data, architecture, settings, seed, n_restarts, quantities, selection)
+    task = _Task(*data, architecture, settings, seed, n_restarts, quantities, selection, judge)
     _check_size(task)
     runs = sorted(
         map_function(functools.partial(_run, task), range(n_restarts)),
@@ -286,7 +298,9 @@ def _run(task: _Task, restart: int) -> tuple[Network | None, TrainingRecord]:
         return None, record
     weights = tuple(matrix.copy() for matrix in minimum.weights)
     network = Network(weights, activation, *normalisations, *task.quantities)
-    if task.selection is not None:
+    if task.judge is not None:
+        record = replace(record, selection_error=task.judge(network))
+    elif task.selection is not None:
         values, expected = (task.selection[0], normalisations[1].to_unit(task.selection[1]))
         residuals = normalisations[1].to_unit(network.predict(values)) - expected
         record = replace(record, selection_error=float(np.sqrt(np.mean(residuals**2))))
