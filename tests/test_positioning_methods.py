@@ -150,7 +150,9 @@ def test_methods_are_built_by_name(geometry):
 
 def test_wrong_names_are_told(geometry):
     ingredients = Ingredients(geometry, closed_form(geometry))
-    with pytest.raises(ParameterError, match=r"'combine' is not known.*'combined', 'none'"):
+    with pytest.raises(
+        ParameterError, match=r"'combine' is not known.*'combined', 'direct'.*'none'"
+    ):
         build_method("combine", ingredients)
     with pytest.raises(PositioningError, match="expected a network 'deflection'"):
         build_method("combined", ingredients)

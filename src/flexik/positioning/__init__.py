@@ -3,13 +3,16 @@
 from collections.abc import Callable
 
 from flexik.errors import ParameterError
-from flexik.positioning import combined, none
+from flexik.positioning import combined, direct, inverse, modular, none
 from flexik.positioning.ingredients import Ingredients
 from flexik.positioning.method import Method
 
 METHODS: dict[str, Callable[..., Method]] = {
     "none": none.build,
     "combined": combined.build,
+    "direct": direct.build,
+    "modular": modular.build,
+    "inverse": inverse.build,
 }
 
 
