@@ -7,8 +7,16 @@ import pandas as pd
 import pytest
 
 from flexik.errors import DataError, ParameterError
-from flexik.evaluation.conditions import all_conditions
-from flexik.evaluation.errors import STATISTICS, comparison, evaluate, statistics
+from flexik.evaluation.conditions import all_conditions, random_conditions
+from flexik.evaluation.errors import (
+    STATISTICS,
+    comparison,
+    evaluate,
+    statistics,
+    statistics_without,
+    workspace_statistics,
+    worst_points,
+)
 from flexik.positioning.method import NOT_CONVERGED, REACHED, Command, PositioningError
 
 PUBLISHED = Path(__file__).parents[1] / "data/reference/crane/positioning_errors.csv"
@@ -47,6 +55,26 @@ def test_bad_conditions_are_told(points, payloads):
         all_conditions(points, payloads)
 
 
+def test_random_conditions_are_points_of_their_own():
+    targets, payload = [[1.0, 2.0], [1.0, 2.0], [4.0, 1.0]], [30.0, 470.0, 30.0]
+    conditions = random_conditions(pd.DataFrame(targets, index=[7, 3, 1]), pd.Series(payload))
+    assert len(conditions) == 3
+    assert conditions.targets.tolist() == targets
+    assert conditions.payload.tolist() == payload
+    assert conditions.point_index.tolist() == [0, 1, 2]
+    assert conditions.point_index.dtype == np.int64
+    assert len(random_conditions(np.empty((0, 2)), np.empty(0))) == 0
+
+
+@pytest.mark.parametrize(
+    ("targets", "payload"),
+    [([[1.0, 2.0]], [30.0, 50.0]), ([[1.0, 2.0, 3.0]], [30.0]), ([1.0, 2.0], [30.0, 50.0])],
+)
+def test_random_conditions_of_other_lengths_are_told(targets, payload):
+    with pytest.raises(ParameterError, match=r"targets\.shape=.*expected \(m, 2\) and \(m,\)"):
+        random_conditions(targets, payload)
+
+
 def test_errors_are_desired_minus_achieved_and_failures_stay():
     frame = evaluate(method, two_conditions(), np.zeros((2, 3)), flexible_tip)
     assert frame.columns.tolist() == [
@@ -76,6 +104,81 @@ def test_statistics_by_hand():
             "n_failed": 1,
         }
     )
+
+
+def test_workspace_statistics_by_hand():
+    # 0 to 100 mm in any order: every percentile is a row; three rows failed
+    order = np.random.default_rng(0).permutation(101)
+    frame = pd.DataFrame({"error": 0.001 * order, "status": np.where(order > 97, NOT_CONVERGED, 0)})
+    assert workspace_statistics(frame) == pytest.approx(
+        {
+            "mean_error": 0.050,
+            "median_error": 0.050,
+            "p95_error": 0.095,
+            "p99_error": 0.099,
+            "max_error": 0.100,
+            "n_targets": 101,
+            "n_failed": 3,
+        }
+    )
+    # percentiles between rows are interpolated
+    assert workspace_statistics(frame.iloc[:0:-1])["n_targets"] == 100
+    pair = pd.DataFrame({"error": [0.0, 0.010], "status": 0})
+    assert workspace_statistics(pair)["p95_error"] == pytest.approx(0.0095)
+
+
+def errors_of_points():
+    """Three points with two payloads; the largest errors are those of (4, 1), then of (3, 2)."""
+    errors = [0.001, 0.002, 0.009, 0.001, 0.004, 0.005]
+    return pd.DataFrame(
+        {
+            "target_x": [1.0, 1.0, 4.0, 4.0, 3.0, 3.0],
+            "target_y": [2.0, 2.0, 1.0, 1.0, 2.0, 2.0],
+            "error_x": errors,
+            "error_y": 0.0,
+            "error": errors,
+            "status": [0, 0, 0, NOT_CONVERGED, 0, 0],
+        }
+    )
+
+
+def test_worst_points_have_the_largest_errors_over_their_payloads():
+    frame = errors_of_points()
+    assert worst_points(frame).tolist() == [[4.0, 1.0], [3.0, 2.0]]
+    assert worst_points(frame, 1).tolist() == [[4.0, 1.0]]
+    assert worst_points(frame.sample(frac=1.0, random_state=1), 3).tolist() == [
+        *([4.0, 1.0], [3.0, 2.0], [1.0, 2.0])
+    ]
+    with pytest.raises(DataError, match="expected 4 target points or more, found 3"):
+        worst_points(frame, 4)
+
+
+def test_equal_errors_come_by_their_coordinates():
+    frame = errors_of_points().assign(error=0.001)
+    assert worst_points(frame).tolist() == [[1.0, 2.0], [3.0, 2.0]]
+
+
+def test_statistics_without_points_by_hand():
+    found = statistics_without(errors_of_points(), [[4.0, 1.0]])
+    assert found["max_error"] == 0.005
+    assert found["mean_error"] == pytest.approx(0.003)
+    assert (found["n_conditions"], found["n_failed"]) == (4, 0)
+
+
+def test_statistics_without_no_point_are_all_statistics():
+    frame = errors_of_points()
+    assert statistics_without(frame, np.empty((0, 2))) == statistics(frame)
+
+
+def test_points_that_cannot_be_left_out_are_told():
+    frame = errors_of_points()
+    # both coordinates are in the frame, not together
+    with pytest.raises(DataError, match=r"\(4, 2\)"):
+        statistics_without(frame, [[4.0, 1.0], [4.0, 2.0]])
+    with pytest.raises(PositioningError, match="points: expected shape"):
+        statistics_without(frame, [4.0, 1.0])
+    with pytest.raises(DataError, match="no error is left"):
+        statistics_without(frame, worst_points(frame, 3))
 
 
 def test_misfits_are_told():

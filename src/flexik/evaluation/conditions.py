@@ -46,3 +46,11 @@ def all_conditions(points: ArrayLike, payloads: ArrayLike) -> Conditions:
         np.tile(payloads, len(points)),
         np.repeat(np.arange(len(points)), len(payloads)),
     )
+
+
+def random_conditions(targets: ArrayLike, payload: ArrayLike) -> Conditions:
+    """Conditions of `targets` (m, 2) in m with `payload` (m,) in kg, each a point of its own."""
+    targets, payload = np.asarray(targets, dtype=float), np.asarray(payload, dtype=float)
+    if targets.shape != (len(payload), 2):
+        raise ParameterError(f"{targets.shape=}, {payload.shape=}, expected (m, 2) and (m,)")
+    return Conditions(targets, payload, np.arange(len(payload)))

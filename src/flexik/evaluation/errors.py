@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from flexik.errors import DataError
 from flexik.evaluation.conditions import Array, Conditions
@@ -91,6 +92,52 @@ def statistics(frame: pd.DataFrame) -> dict[str, float]:
         "n_conditions": len(frame),
         "n_failed": int((frame["status"] != REACHED).sum()),
     }
+
+
+def workspace_statistics(frame: pd.DataFrame) -> dict[str, float]:
+    """Mean, percentiles and maximum of the errors in `frame`, in m; failed rows are included.
+
+    Keys mean_error, median_error, p95_error, p99_error (interpolated linearly between rows),
+    max_error, n_targets, n_failed.
+    """
+    error = frame["error"]
+    return {
+        "mean_error": float(error.mean()),
+        "median_error": float(error.median()),
+        "p95_error": float(error.quantile(0.95)),
+        "p99_error": float(error.quantile(0.99)),
+        "max_error": float(error.max()),
+        "n_targets": len(frame),
+        "n_failed": int((frame["status"] != REACHED).sum()),
+    }
+
+
+def statistics_without(frame: pd.DataFrame, points: ArrayLike) -> dict[str, float]:
+    """Return `statistics` of `frame` without all rows of the target `points` (k, 2) in m.
+
+    Raises DataError if a point is no target of the frame (exactly), or nothing is left.
+    """
+    left = np.ones(len(frame), dtype=bool)
+    for x, y in checked("points", points, None, 2):
+        of_point = ((frame["target_x"] == x) & (frame["target_y"] == y)).to_numpy()
+        if not of_point.any():
+            raise DataError(f"expected the target ({x:g}, {y:g}) m among the errors, found none")
+        left &= ~of_point
+    if not left.any():
+        raise DataError("no error is left without the points that are left out")
+    return statistics(frame[left])
+
+
+def worst_points(frame: pd.DataFrame, n: int = 2) -> Array:
+    """Coordinates (n, 2) in m of the targets with the largest errors, worst first.
+
+    The error of a target is the largest over its payloads; equal ones come by their coordinates.
+    Raises DataError if there are fewer targets.
+    """
+    largest = frame.groupby(["target_x", "target_y"])["error"].max()
+    if len(largest) < n:
+        raise DataError(f"expected {n} target points or more, found {len(largest)}")
+    return np.array(largest.nlargest(n).index.to_list(), dtype=float).reshape(n, 2)
 
 
 def comparison(
