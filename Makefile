@@ -11,7 +11,7 @@ export MKL_NUM_THREADS := 1
 export DVC_NO_ANALYTICS := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: repro smoke test lint benchmark benchmark-training setup clean
+.PHONY: repro smoke test lint benchmark benchmark-training benchmark-positioning setup clean
 
 repro: $(VENV)/.pipeline ## run the pipeline; only what changed is computed
 	$(BIN)/python stages/validate.py --check
@@ -33,6 +33,10 @@ benchmark: $(VENV)/.dev ## timings of the generation beside other ways; writes r
 
 benchmark-training: $(VENV)/.benchmark ## timings of the trainers beside other packages
 	$(BIN)/python benchmarks/training.py
+
+benchmark-positioning: $(VENV)/.dev ## timings of the positioning methods and of how networks were trained
+	$(BIN)/python benchmarks/positioning.py
+	$(BIN)/python benchmarks/training_methods.py
 
 setup: $(VENV)/.dev ## everything a developer needs
 
