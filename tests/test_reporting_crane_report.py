@@ -8,10 +8,12 @@ import pandas as pd
 import pytest
 
 from flexik.errors import DataError
+from flexik.evaluation import operations
+from flexik.learning.perceptron import Network, Normalisation, Quantity
 from flexik.mechanisms.crane import STROKE_LIMIT
 from flexik.parameters import load_parameters
 from flexik.positioning.method import NOT_CONVERGED
-from flexik.reporting import crane_notes, crane_report
+from flexik.reporting import crane_notes, crane_report, crane_results, crane_tables
 
 ROOT = Path(__file__).parents[1]
 
@@ -35,19 +37,52 @@ def results(crane):
             "max_relative": [0.01, 0.0],
         }
     )
-    published = pd.DataFrame({"statistic": ["mean_error"], "none": [31.9], "combined": [4.1]})
+    published = crane_results.Published(
+        errors=pd.DataFrame({"statistic": ["mean_error"], "none": [31.9], "combined": [4.1]}),
+        sizes={"deflection": 14},
+        without_worst=pd.DataFrame(
+            {
+                "method": ["direct"] * 2,
+                "x": [1.0, 2.0],
+                "y": [7.0, 7.0],
+                "max_error": [33.9] * 2,
+                "mean_error": [14.7] * 2,
+            }
+        ),
+        tolerances=pd.DataFrame(
+            {
+                "method": ["direct"],
+                "tolerance": [1e-5],
+                "mean_iterations": [114],
+                "max_iterations": [155],
+                "error_ratio": [1.75],
+            }
+        ),
+        operations={"inverse": 395.0},
+    )
     nothing = pd.DataFrame()
-    return crane_report.Results(
+    return crane_results.Results(
         crane=crane,
         spring_stiffness=8e6,
         grid=nothing,
         selection=nothing,
         errors={},
+        workspace={},
         published=published,
-        published_sizes={"deflection": 14},
         mesh_study=mesh,
         training=nothing,
         studies={},
+        networks={},
+        tolerances=nothing,
+        fitting=nothing,
+        query_times=pd.DataFrame(
+            {
+                "method": ["none", "direct"],
+                "microseconds_single": [1.0, 20.0],
+                "microseconds_batched": [0.5, 2.0],
+            }
+        ),
+        training_curves=nothing,
         shape={},
     )
 
@@ -149,7 +184,7 @@ def test_the_worst_point_is_named_where_there_are_others():
 
 
 def test_the_mesh_table_takes_its_samples_from_the_study(results, tmp_path):
-    crane_report._write_mesh_table(results, tmp_path)
+    crane_tables._write_mesh_study(results, tmp_path)
     text = (tmp_path / "mesh_study.md").read_text()
     assert "refinement 2" in text and "37 random samples" in text
     table = pd.read_csv(tmp_path / "mesh_study.csv")
@@ -157,30 +192,143 @@ def test_the_mesh_table_takes_its_samples_from_the_study(results, tmp_path):
     assert table["mean (% of deflection)"].tolist() == [0.5, 0.0]
     less = dataclasses.replace(results, mesh_study=results.mesh_study.drop(columns="n_samples"))
     with pytest.raises(DataError, match=r"mesh study.*n_samples"):
-        crane_report._write_mesh_table(less, tmp_path)
+        crane_tables._write_mesh_study(less, tmp_path)
 
 
 def test_a_method_that_is_not_published_has_no_column(results):
-    assert set(results.published_columns.values()) == {"combined"}
-    less = dataclasses.replace(results, published=results.published.drop(columns="combined"))
+    columns = results.published_columns
+    assert {columns[label] for label in ("combined", "combined_selected")} == {"combined"}
+    assert {columns[label] for label in ("direct", "modular", "inverse_selected")} == {None}
+    errors = results.published.errors.drop(columns="combined")
+    published = dataclasses.replace(results.published, errors=errors)
+    less = dataclasses.replace(results, published=published)
     assert less.published_columns == dict.fromkeys(results.crane.methods)
+
+
+def test_methods_are_grouped_by_their_names(results, crane):
+    methods = {
+        "modular": crane.methods["modular"],
+        "combined_selected": crane.methods["combined_selected"],
+        "direct_selected_too": crane.methods["direct_selected"],
+        "combined": crane.methods["combined"],
+    }
+    chosen = crane.model_copy(update={"methods": methods})
+    assert dataclasses.replace(results, crane=chosen).groups == {
+        "published": ["modular", "combined"],
+        "selected": ["combined_selected"],
+        "variants": ["direct_selected_too"],
+    }
+
+
+def network(n_hidden, inputs=4, outputs=2):
+    """Zero weights: only sizes count."""
+    limits = [Normalisation(-np.ones(n), np.ones(n)) for n in (inputs, outputs)]
+    weights = np.zeros((n_hidden, inputs + 1)), np.zeros((outputs, n_hidden + 1))
+    columns = [tuple(Quantity(f"c{k}", "m") for k in range(n)) for n in (inputs, outputs)]
+    return Network(weights, "tanh", *limits, *columns)
+
+
+def test_operations_of_a_query_follow_from_method_and_network(results, crane):
+    names = ("combined", "inverse", "direct", "direct_gauss_newton")
+    sizes = {crane.methods[label].network: network(14) for label in names}
+    steps = pd.DataFrame({"n_iterations": [10, 30]})
+    results = dataclasses.replace(results, networks=sizes, errors=dict.fromkeys(names[2:], steps))
+    forward = 14 * 4 * 2 + 14 + 2 * 14 * 2 + 2 * (4 + 2)
+    assert results.query_operations("combined") == forward
+    assert results.query_operations("inverse") == forward
+    normalisation = operations.normalisation_operations(network(14))
+    for label, step in [
+        ("direct", operations.inversion_step_operations),
+        ("direct_gauss_newton", operations.gauss_newton_step_operations),
+    ]:
+        expected = normalisation + 20.0 * step(network(14), 3)
+        assert results.query_operations(label) == expected
+    twice = crane.methods["combined"].model_copy(update={"n_corrections": 2})
+    chosen = crane.model_copy(update={"methods": {"combined": twice}})
+    results = dataclasses.replace(results, crane=chosen)
+    assert results.query_operations("combined") == 2 * forward
+
+
+def test_points_that_the_thesis_leaves_out_and_our_worst(results, crane, tmp_path):
+    rows = [(1, 7, 0.03), (2, 7, 0.05), (3, 1, 0.04), (4, 1, 0.01), (5, 1, 0.02)]
+    errors = pd.DataFrame(rows, columns=["target_x", "target_y", "error"]).astype(float)
+    errors = errors.assign(error_x=errors["error"], error_y=0.0, status=0)
+    chosen = crane.model_copy(update={"methods": {"direct": crane.methods["direct"]}})
+    results = dataclasses.replace(results, crane=chosen, errors={"direct": errors})
+    crane_tables._write_without_worst(results, tmp_path)
+    table = pd.read_csv(tmp_path / "without_worst_points.csv")
+    assert table["without"].tolist() == ["(1, 7) and (2, 7)", "(2, 7) and (3, 1)"]
+    assert table["max R (mm)"].tolist() == [40.0, 30.0]
+    np.testing.assert_allclose(table["mean R (mm)"], [70 / 3, 20.0], atol=1e-3)
+    assert table["max R published (mm)"].fillna(0).tolist() == [33.9, 0.0]
+
+
+def test_tolerances_stand_beside_the_published(results, tmp_path):
+    study = pd.DataFrame(
+        {
+            "method": ["direct", "direct"],
+            "tolerance": [1e-5, 1e-7],
+            "mean_error": [0.03, 0.02],
+            "max_error": [0.05, 0.06],
+            "mean_iterations": [10.5, 20.25],
+            "max_iterations": [11, 40],
+            "n_failed": [0, 1],
+        }
+    )
+    crane_tables._write_tolerances(dataclasses.replace(results, tolerances=study), tmp_path)
+    table = pd.read_csv(tmp_path / "tolerance_study.csv")
+    assert table["tolerance"].tolist() == [1e-5, 1e-7]
+    assert table["mean R over that at 1e-07"].tolist() == [1.5, 1.0]
+    assert table["published mean"].fillna(0).tolist() == [114.0, 0.0]
+    assert table["published ratio"].fillna(0).tolist() == [1.75, 0.0]
+    assert table["failed"].tolist() == [0, 1]
+
+
+def test_metrics_tell_conditions_and_workspace(results, crane):
+    errors = pd.DataFrame({"error_x": [0.003, 0.0], "error_y": [0.004, 0.001], "status": [0, 3]})
+    errors["error"] = np.hypot(errors["error_x"], errors["error_y"])
+    table = pd.DataFrame({"status": [0, 1, 0]})
+    results = dataclasses.replace(
+        results,
+        errors={"none": errors, "new": errors},
+        workspace={"none": errors, "new": errors[:0]},
+        grid=table,
+        selection=table,
+    )
+    found = crane_report.metrics(results)
+    assert found["none.mean_error_mm"] == found["new.mean_error_mm"] == 3.0
+    assert found["none.max_abs_dy_mm"] == 4.0 and found["none.n_failed"] == 1
+    assert found["none.workspace_mean_error_mm"] == 3.0
+    assert found["none.workspace_p99_error_mm"] == pytest.approx(4.96)
+    assert found["none.workspace_n_failed"] == 1
+    assert not any(name.startswith("new.workspace") for name in found)
+    assert found["grid.n_samples"] == 3 and found["grid.n_left_out"] == 1
+
+
+def test_what_each_kind_of_method_does_is_told(crane):
+    lines = crane_notes.methods_text(crane.methods).splitlines()
+    text = {line.split("`")[1]: line for line in lines if line.startswith("- ")}
+    assert "inverted by gradient descent" in text["direct"] and "1e-07" in text["direct"]
+    assert "joined" in text["modular"] and "joined" not in text["direct"]
+    assert "Gauss-Newton" in text["direct_gauss_newton"]
+    assert "appendix B" in text["inverse"] and "`inverse`" in text["inverse"]
 
 
 @pytest.mark.parametrize(("chosen", "at_the_end"), [(4, True), (5, False), (6, True)])
 def test_the_size_table_tells_the_choice(results, tmp_path, chosen, at_the_end):
     (name, selected), *_ = results.crane.selected_networks.items()
     sizes = pd.DataFrame(
-        {column: np.array([0.3, 0.2, 0.1]) for column in crane_report.SIZE_TABLE}
+        {column: np.array([0.3, 0.2, 0.1]) for column in crane_tables.SIZE_TABLE}
         | {"n_hidden": [4, 5, 6], "best_restart": [0, 2, 1], "n_failed": 0, "unused": 1.0}
     )
     results = dataclasses.replace(results, studies={name: (sizes, chosen)})
-    crane_report._write_sizes_table(results, name, sizes, tmp_path)
+    crane_tables._write_sizes(results, name, tmp_path)
     text = (tmp_path / "size_selection" / f"{name}.md").read_text()
     assert text.startswith(f"{name}: ") and f"of {selected.select.n_restarts} by" in text
     published = results.crane.networks["deflection"].n_hidden
     assert f"- chosen: {chosen}, published: {published}\n" in text
     assert ("end of the range" in text) == at_the_end
     table = pd.read_csv(tmp_path / "size_selection" / f"{name}.csv")
-    assert list(table) == [column.replace("_", " ") for column in crane_report.SIZE_TABLE]
+    assert list(table) == [column.replace("_", " ") for column in crane_tables.SIZE_TABLE]
     assert table["selection error"].tolist() == [0.3, 0.2, 0.1]
     assert table["n hidden"].tolist() == [4, 5, 6]

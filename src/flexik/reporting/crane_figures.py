@@ -86,6 +86,40 @@ def normalised_deflection(path: Path | str, grid: pd.DataFrame) -> None:
     style.write_png(path, _figure_normalised_deflection, grid)
 
 
+def normalised_rigid(path: Path | str, grid: pd.DataFrame) -> None:
+    """Normalised tip of the rigid model at the kept vectors (Rouvinen 1999, figure 4.12).
+
+    Raises DataError as `training_points` does.
+    """
+    style.write_png(path, _figure_normalised_points, grid, "rigid", "rigid tip")
+
+
+def normalised_tip(path: Path | str, grid: pd.DataFrame) -> None:
+    """Normalised tip of the flexible model at the kept vectors (Rouvinen 1999, figure 4.17).
+
+    Raises DataError as `training_points` does.
+    """
+    style.write_png(path, _figure_normalised_points, grid, "tip", "flexible tip")
+
+
+def normalised_difference(path: Path | str, values: ArrayLike) -> None:
+    """Normalised flexible tip minus trained rigid network (Rouvinen 1999, figure 4.13).
+
+    Parameters
+    ----------
+    path
+        PNG to write.
+    values
+        Differences (n, 2) in m, in the order of the kept grid vectors.
+
+    Raises
+    ------
+    DataError
+        If `values` has another shape, no row, or is not finite.
+    """
+    style.write_png(path, _figure_normalised_difference, np.asarray(values, dtype=float))
+
+
 def _kept(grid: pd.DataFrame) -> pd.DataFrame:
     style.require("training grid", grid.columns, GRID_COLUMNS)
     kept = grid.loc[grid["status"] == KEPT, list(GRID_COLUMNS)]
@@ -248,17 +282,37 @@ def _sequence(whole: Axes, detail: Axes, values: Array, colour: str) -> None:
 
 def _figure_normalised_deflection(grid: pd.DataFrame) -> Figure:
     kept = _kept(grid)
+    return _figure_pair(_points(kept, "tip") - _points(kept, "rigid"), "deflection", "mm", MM)
+
+
+def _figure_normalised_points(grid: pd.DataFrame, which: str, what: str) -> Figure:
+    return _figure_pair(_points(_kept(grid), which), what, "m", 1.0)
+
+
+def _figure_normalised_difference(values: Array) -> Figure:
+    if values.ndim != 2 or values.shape[1] != 2 or not len(values):
+        raise DataError(f"normalised difference: {values.shape=}, expected (n, 2) with n > 0")
+    style.finite("normalised difference", {"values": values})
+    return _figure_pair(values, "flexible tip minus trained rigid network", "mm", MM)
+
+
+def _points(kept: pd.DataFrame, which: str) -> Array:
+    return kept[[f"{which}_x", f"{which}_y"]].to_numpy()
+
+
+def _figure_pair(values: Array, what: str, unit: str, scale: float) -> Figure:
+    """Sequences of the two columns of `values`, whose ranges stand in the titles times `scale`."""
     figure = Figure(figsize=(style.WIDTH, 5.6))
     panels = figure.subplots(2, 2, sharex="col", sharey=True, width_ratios=(3, 1.3))
-    for (whole, detail), axis, colour in zip(
-        panels, ("x", "y"), (style.BLUE, style.VERMILION), strict=True
+    digits = 1 if unit == "mm" else 2
+    for (whole, detail), axis, column, colour in zip(
+        panels, ("x", "y"), values.T, (style.BLUE, style.VERMILION), strict=True
     ):
-        deflection = (kept[f"tip_{axis}"] - kept[f"rigid_{axis}"]).to_numpy()
-        _sequence(whole, detail, _normalised(deflection), colour)
-        low, high = (style.signed(round(MM * v, 1)) for v in (deflection.min(), deflection.max()))
-        whole.set_title(f"deflection in {axis}: {low} to {high} mm", fontsize=10)
+        _sequence(whole, detail, _normalised(column), colour)
+        low, high = (style.signed(round(scale * v, digits)) for v in (column.min(), column.max()))
+        whole.set_title(f"{what} in {axis}: {low} to {high} {unit}", fontsize=10)
         whole.set_ylabel("normalised (1)")
-    panels[0, 1].set_title(f"first {min(DETAIL, len(kept))}", fontsize=10)
+    panels[0, 1].set_title(f"first {min(DETAIL, len(values))}", fontsize=10)
     for axes in panels[-1]:
         axes.set_xlabel("vector number")
     return figure

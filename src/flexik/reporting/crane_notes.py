@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from flexik.parameters import MethodModel
+from flexik.parameters import CombinedModel, InvertedModel, MethodModel
 from flexik.positioning.method import REACHED, STATUS_MEANING
 from flexik.reporting.style import MM, coordinates
 
@@ -18,17 +18,11 @@ CALIBRATION_TARGET = 10.0  # %, accepted difference from the published
 def methods_text(methods: Mapping[str, MethodModel]) -> str:
     """What each method does, a list in Markdown, and what limits the genetic ones."""
     lines = ["- `none`: rigid inverse kinematics alone, in closed form."]
-    for label, method in methods.items():
-        inverse = {"closed_form": "in closed form", "genetic": "by the thesis' genetic algorithm"}
-        lines.append(
-            f"- `{label}`: rigid inverse, deflection by the network `{method.network}`, corrected "
-            f"target, rigid inverse again (corrections: {method.n_corrections}); inverses "
-            f"{inverse[method.inverse]}."
-        )
+    lines += [f"- `{label}`: {_method_text(method)}" for label, method in methods.items()]
     floors = [
         f"`{label}`: {MM * method.genetic.tolerance:g} mm"
         for label, method in methods.items()
-        if method.genetic is not None
+        if isinstance(method, CombinedModel) and method.genetic is not None
     ]
     text = "\n".join(lines)
     if floors:
@@ -37,6 +31,24 @@ def methods_text(methods: Mapping[str, MethodModel]) -> str:
             f"({', '.join(floors)}) and so sets its own floor."
         )
     return text
+
+
+def _method_text(method: MethodModel) -> str:
+    network = f"network `{method.network}`"
+    if isinstance(method, CombinedModel):
+        inverse = {"closed_form": "in closed form", "genetic": "by the thesis' genetic algorithm"}
+        return (
+            f"rigid inverse, deflection by the {network}, corrected target, rigid inverse again "
+            f"(corrections: {method.n_corrections}); inverses {inverse[method.inverse]}."
+        )
+    if isinstance(method, InvertedModel):
+        search = {"gradient_descent": "gradient descent", "gauss_newton": "damped Gauss-Newton"}
+        joined = " (rigid network and correction, joined)" if method.method == "modular" else ""
+        return (
+            f"{network} of the tip{joined}, inverted by {search[method.inversion.kind]} on its "
+            f"inputs to a tolerance of {method.inversion.tolerance:g}, within the stroke limits."
+        )
+    return f"{network} of lift and jib stroke; extension by the rule of appendix B."
 
 
 def point_notes(points: Sequence[tuple[float, float]]) -> list[str]:
