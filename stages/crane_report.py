@@ -1,33 +1,47 @@
 """Tables, figures, metrics and the report page of the crane.
 
-Reads params.yaml: crane; what the other crane stages wrote; the published table.
-Writes reports/crane/: positioning_errors, calibration, mesh_study, training and size_selection/
-(CSV and Markdown), errors.csv with every condition of every method, metrics.json, figures/ and
-README.md.
+Reads params.yaml: crane; what the other crane stages wrote; the published values; the timings that
+the benchmarks wrote.
+Writes reports/crane/: tables (CSV and Markdown), errors.csv with every test condition of every
+method, metrics.json, figures/ and README.md.
 """
 
 from pathlib import Path
 
 import pandas as pd
 
-from flexik import stage
+from flexik import parameters, stage
 from flexik.datasets.crane import FIELDS
-from flexik.datasets.evaluations import read_evaluation
+from flexik.datasets.crane_learning import FITTING_FIELDS
+from flexik.datasets.evaluations import TOLERANCE_FIELDS, read_evaluation
 from flexik.datasets.provenance import (
     evaluation_checksum,
+    fitting_checksum,
     grid_checksum,
     network_checksum,
     selection_checksum,
+    tolerance_checksum,
+    workspace_checksum,
 )
 from flexik.datasets.tables import read_csv, read_table
 from flexik.files import read_json
 from flexik.learning.size_selection import FIELDS as STUDY_FIELDS
 from flexik.learning.size_selection import by_size, read_choice
+from flexik.learning.storage import load_network
 from flexik.multibody.assembly import read_spring_stiffness
 from flexik.parameters import load_parameters
-from flexik.reporting.crane_report import Results, write_report
+from flexik.reporting.crane_report import write_report
+from flexik.reporting.crane_results import Published, Results
 
 DATA, REPORTS = Path("data/crane"), Path("reports/crane")
+BENCHMARKS, REFERENCE = Path("reports/benchmarks"), Path("data/reference/crane")
+PUBLISHED = (
+    "positioning_errors",
+    "network_sizes",
+    "without_worst_points",
+    "tolerance_study",
+    "operations",
+)
 MESH_COLUMNS = (
     "n_samples",
     "refinement",
@@ -37,48 +51,85 @@ MESH_COLUMNS = (
     "max_relative",
 )
 TRAINING_COLUMNS = ("restart", "n_hidden", "n_iterations", "training_error", "selection_error")
-PUBLISHED = Path("data/reference/crane/positioning_errors.csv")
-PUBLISHED_SIZES = Path("data/reference/crane/network_sizes.csv")
 
 
 def main() -> None:
     """Run the stage."""
     crane = load_parameters().crane
     stiffness = read_spring_stiffness(DATA / "calibration.json")
-    errors = {
-        label: read_evaluation(
-            DATA / "evaluations" / f"{label}.parquet",
-            evaluation_checksum(crane, stiffness, label),
-        )
-        for label in ("none", *crane.methods)
-    }
-    names = [*crane.networks, *crane.selected_networks]
     training = {
         name: read_csv(DATA / "networks" / f"{name}_training.csv", TRAINING_COLUMNS)
-        for name in names
+        for name in crane.all_networks
     }
-    studies = {}
-    for name in crane.selected_networks:
-        made_with = network_checksum(crane, stiffness, name)
-        runs = read_table(DATA / "size_selection" / f"{name}.parquet", STUDY_FIELDS, made_with)
-        chosen = read_choice(DATA / "size_selection" / f"{name}.json")
-        studies[name] = by_size(runs), chosen
     selection_made = selection_checksum(crane, stiffness)
-    sizes = read_csv(PUBLISHED_SIZES, ("n_hidden",), ("network",))
+    tolerances_made = tolerance_checksum(crane, stiffness)
+    fitting_made = fitting_checksum(crane, stiffness)
     results = Results(
         crane=crane,
         spring_stiffness=stiffness,
         grid=read_table(DATA / "grid.parquet", FIELDS, grid_checksum(crane, stiffness)),
         selection=read_table(DATA / "selection.parquet", FIELDS, selection_made),
-        errors=errors,
-        published=read_csv(PUBLISHED, ("none",), ("statistic",)),
-        published_sizes=dict(zip(sizes["network"], sizes["n_hidden"], strict=True)),
+        errors=evaluations(crane, stiffness, "evaluations"),
+        workspace=evaluations(crane, stiffness, "workspace"),
+        published=published(),
         mesh_study=read_csv(DATA / "mesh_study.csv", MESH_COLUMNS, ("element",)),
         training=pd.concat(training, names=["network"]).reset_index(level="network"),
-        studies=studies,
+        studies=studies(crane, stiffness),
+        networks={
+            name: load_network(
+                DATA / "networks" / f"{name}.json", network_checksum(crane, stiffness, name)
+            )[0]
+            for name in crane.all_networks
+        },
+        tolerances=read_table(DATA / "tolerance_study.parquet", TOLERANCE_FIELDS, tolerances_made),
+        fitting=read_table(DATA / "fitting.parquet", FITTING_FIELDS, fitting_made),
+        query_times=read_csv(
+            BENCHMARKS / "positioning.csv",
+            ("microseconds_single", "microseconds_batched"),
+            ("method",),
+        ),
+        training_curves=read_csv(
+            BENCHMARKS / "training_methods.csv", ("seconds", "error"), ("trainer",)
+        ),
         shape=read_json(DATA / "shape.json"),
     )
-    write_report(results, REPORTS, PUBLISHED)
+    write_report(results, REPORTS, [REFERENCE / f"{name}.csv" for name in PUBLISHED])
+
+
+def evaluations(crane: parameters.Crane, stiffness: float, folder: str) -> dict[str, pd.DataFrame]:
+    """Errors by method, of the test conditions or over the workspace."""
+    made_with = {"evaluations": evaluation_checksum, "workspace": workspace_checksum}[folder]
+    return {
+        label: read_evaluation(
+            DATA / folder / f"{label}.parquet", made_with(crane, stiffness, label)
+        )
+        for label in ("none", *crane.methods)
+    }
+
+
+def studies(crane: parameters.Crane, stiffness: float) -> dict[str, tuple[pd.DataFrame, int]]:
+    """Errors by size, and the chosen size, by network."""
+    found = {}
+    for name in crane.studies:
+        made_with = network_checksum(crane, stiffness, name)
+        runs = read_table(DATA / "size_selection" / f"{name}.parquet", STUDY_FIELDS, made_with)
+        found[name] = by_size(runs), read_choice(DATA / "size_selection" / f"{name}.json")
+    return found
+
+
+def published() -> Published:
+    """Values of the thesis."""
+    sizes = read_csv(REFERENCE / "network_sizes.csv", ("n_hidden",), ("network",))
+    operations = read_csv(REFERENCE / "operations.csv", ("operations",), ("method",))
+    points = ("x", "y", "max_error", "mean_error")
+    iterations = ("tolerance", "mean_iterations", "max_iterations", "error_ratio")
+    return Published(
+        errors=read_csv(REFERENCE / "positioning_errors.csv", ("none",), ("statistic",)),
+        sizes=dict(zip(sizes["network"], sizes["n_hidden"], strict=True)),
+        without_worst=read_csv(REFERENCE / "without_worst_points.csv", points, ("method",)),
+        tolerances=read_csv(REFERENCE / "tolerance_study.csv", iterations, ("method",)),
+        operations=dict(zip(operations["method"], operations["operations"], strict=True)),
+    )
 
 
 if __name__ == "__main__":

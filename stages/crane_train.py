@@ -1,27 +1,31 @@
 """Train one network of the crane from several starts; the selection set chooses among them.
 
-Usage: crane_train.py NETWORK, a name under crane.networks or crane.selected_networks.
-Reads params.yaml: parallel, crane.networks.NETWORK or crane.selected_networks.NETWORK (and
+Usage: crane_train.py NETWORK, a name under crane.networks, crane.modular_networks,
+crane.selected_networks or crane.selected_modular_networks.
+Reads params.yaml: parallel, the section of NETWORK, its trainer under crane.trainers (and
 crane.geometry, crane.structure, crane.grid, crane.selection to know which data belong to it); the
-tables of crane_generate; for a selected network the choice of crane_select.
+tables of crane_generate; for a selected network the choice of crane_select; for a modular one the
+rigid network it corrects, with which it is joined.
 Writes data/crane/networks/NETWORK.json and the training records NETWORK_training.csv.
 """
 
 import functools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from flexik import parameters, stage
-from flexik.datasets.crane_learning import INPUT_FIELDS, KINDS, read_learning_data
+from flexik.datasets.crane_learning import KINDS, read_learning_data
 from flexik.datasets.parallel import ParallelSettings, from_environment, parallel_map
 from flexik.datasets.provenance import network_checksum
 from flexik.errors import ParameterError, TrainingError
 from flexik.files import write_text
-from flexik.learning.perceptron import quantities
+from flexik.learning.modular import combine
+from flexik.learning.perceptron import Network, quantities
 from flexik.learning.size_selection import read_choice
-from flexik.learning.storage import save_network
+from flexik.learning.storage import load_network, save_network
 from flexik.learning.training import Architecture, TrainingRecord, train_best, trainer_settings
 from flexik.multibody.assembly import read_spring_stiffness
 from flexik.parameters import load_parameters
@@ -33,16 +37,17 @@ def main() -> None:
     """Run the stage."""
     given = load_parameters()
     crane, name = given.crane, stage.argument("NETWORK")
-    network = crane.any_network(name)
-    if network is None:
-        known = ", ".join([*crane.networks, *crane.selected_networks])
-        raise ParameterError(f"crane.networks: there is no {name!r} ({known})")
+    if name not in crane.all_networks:
+        known = ", ".join(crane.all_networks)
+        raise ParameterError(f"crane: there is no network {name!r} ({known})")
+    network = crane.all_networks[name]
     stiffness = read_spring_stiffness(DATA / "calibration.json")
-    data = read_learning_data(DATA, crane, stiffness, network.kind)
-    trainer = network.trainer.model_dump()
+    rigid = rigid_network(crane, stiffness, network)
+    data = read_learning_data(DATA, crane, stiffness, network.kind, rigid)
+    trainer = crane.trainers[network.trainer].model_dump()
     settings = from_environment(ParallelSettings(**given.parallel.model_dump()))
     try:
-        architecture = Architecture(size_of(network, name), network.activation)
+        architecture = Architecture(size_of(crane, name), network.activation)
         best, record, records = train_best(
             data.inputs,
             data.outputs,
@@ -52,21 +57,36 @@ def main() -> None:
             trainer_settings(trainer.pop("kind"), trainer),
             network.seed,
             network.n_restarts,
-            quantities(INPUT_FIELDS),
+            quantities(KINDS[network.kind].inputs),
             quantities(KINDS[network.kind].outputs),
             functools.partial(parallel_map, settings=settings, description=f"train {name}"),
+            data.judge,
         )
     except TrainingError as error:
         raise TrainingError(f"network {name}: {error}") from None
     folder = DATA / "networks"
-    save_network(folder / f"{name}.json", best, record, network_checksum(crane, stiffness, name))
     write_text(folder / f"{name}_training.csv", summary(records, best.n_hidden))
+    if rigid is not None:
+        best = combine(rigid, replace(best, outputs=rigid.outputs))
+        best = replace(best, outputs=tuple(quantities(KINDS["direct"].outputs)))
+    save_network(folder / f"{name}.json", best, record, network_checksum(crane, stiffness, name))
     print(f"{name}: restart {record.restart}, selection error {record.selection_error:.3g}")
 
 
-def size_of(network: parameters.NetworkModel | parameters.SelectedNetwork, name: str) -> int:
+def rigid_network(
+    crane: parameters.Crane, stiffness: float, network: parameters.AnyNetwork
+) -> Network | None:
+    """The rigid network that a modular one corrects; None for the others."""
+    if not isinstance(network, parameters.ModularNetwork | parameters.SelectedModularNetwork):
+        return None
+    path = DATA / "networks" / f"{network.rigid}.json"
+    return load_network(path, network_checksum(crane, stiffness, network.rigid))[0]
+
+
+def size_of(crane: parameters.Crane, name: str) -> int:
     """Number of hidden neurons, given or chosen."""
-    if isinstance(network, parameters.NetworkModel):
+    network = crane.all_networks[name]
+    if isinstance(network, parameters.NetworkModel | parameters.ModularNetwork):
         return network.n_hidden
     return read_choice(DATA / "size_selection" / f"{name}.json")
 

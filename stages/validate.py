@@ -56,12 +56,15 @@ def check_crane(crane: parameters.Crane) -> None:
 
 def remove_stale(crane: parameters.Crane) -> None:
     """Delete what stages of earlier names left, which would stay inputs of the report."""
-    networks = {*crane.networks, *crane.selected_networks}
+    evaluations = {f"{label}.parquet" for label in ("none", *crane.methods)}
     current = {
-        "evaluations": {f"{label}.parquet" for label in ("none", *crane.methods)},
-        "networks": {f"{name}{end}" for name in networks for end in (".json", "_training.csv")},
+        "evaluations": evaluations,
+        "workspace": evaluations,
+        "networks": {
+            f"{name}{end}" for name in crane.all_networks for end in (".json", "_training.csv")
+        },
         "size_selection": {
-            f"{name}{end}" for name in crane.selected_networks for end in (".json", ".parquet")
+            f"{name}{end}" for name in crane.studies for end in (".json", ".parquet")
         },
     }
     for folder, names in current.items():

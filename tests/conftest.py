@@ -1,7 +1,12 @@
-"""The log crane and its test conditions, as params.yaml has them."""
+"""The log crane and its test conditions, as params.yaml has them; the pipeline run once."""
+
+import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
+from smoke_pipeline import ROOT, environment
 
 from flexik.mechanisms.crane import CraneGeometry
 
@@ -40,3 +45,21 @@ def points():
 @pytest.fixture(scope="session")
 def payloads():
     return np.array([30.0, 120.0, 260.0, 310.0, 470.0])
+
+
+@pytest.fixture(scope="session")
+def project(tmp_path_factory):
+    """Project whose pipeline has run with the smoke profile; for reading only."""
+    folder = tmp_path_factory.mktemp("smoke") / "project"
+    command = [sys.executable, ROOT / "profiles/run.py", ROOT / "profiles/smoke.yaml", folder]
+    done = subprocess.run(
+        command, env=environment(), capture_output=True, text=True, check=False, cwd=folder.parent
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+@pytest.fixture
+def copy(project, tmp_path):
+    """Copy of the project to change."""
+    return shutil.copytree(project, tmp_path / "copy", symlinks=True)

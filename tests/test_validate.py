@@ -65,7 +65,10 @@ def test_valid_parameters_pass_and_leave_a_constant_file(folder):
         (("methods", "combined", "network", "foo"), "crane.methods.combined.network"),
         (("methods", None), "crane.methods"),
         (("foo", 1), "crane.foo"),
-        (("networks", "deflection", "trainer", "mu", 1e11), "crane.networks.deflection.trainer.mu"),
+        (("trainers", "study", "mu", 1e11), "crane.trainers.study.mu: must not exceed"),
+        (("networks", "rigid", "trainer", "foo"), "crane.networks.rigid.trainer"),
+        (("modular_networks", "modular", "rigid", "foo"), "crane.modular_networks.modular.rigid"),
+        (("tolerance_study", "methods", ["inverse"]), "crane.tolerance_study.methods.0"),
         (
             ("structure", "beams", "jib", "section", "data/nosuch.csv"),
             "crane.structure.beams.jib.section: section table data/nosuch.csv",
@@ -83,18 +86,27 @@ def test_a_mistake_is_one_line_that_names_the_key(folder, where, key):
 
 def test_results_of_names_that_are_gone_are_removed(folder):
     crane = load_parameters(folder / "params.yaml").crane
-    label = next(iter(crane.methods))
-    kept = folder / f"data/crane/evaluations/{label}.parquet"
+    data = folder / "data/crane"
+    labels = ("none", *crane.methods)
+    kept = [data / f"{place}/{m}.parquet" for place in ("evaluations", "workspace") for m in labels]
+    for name in crane.all_networks:
+        kept += [data / f"networks/{name}.json", data / f"networks/{name}_training.csv"]
+    for name in crane.studies:
+        kept += [data / f"size_selection/{name}.json", data / f"size_selection/{name}.parquet"]
     stale = [
-        folder / "data/crane/evaluations/gone.parquet",
-        folder / "data/crane/networks/gone_training.csv",
+        *(data / f"{place}/gone.parquet" for place in ("evaluations", "workspace")),
+        *(data / "networks" / name for name in ("gone.json", "gone_training.csv")),
+        # of a network whose size is given
+        *(data / "size_selection" / f"rigid.{end}" for end in ("json", "parquet")),
     ]
-    for path in (kept, *stale):
+    for path in (*kept, *stale):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("")
     done = validate(folder)
-    assert kept.exists() and not any(path.exists() for path in stale)
-    assert "gone.parquet" in done.stdout
+    assert done.returncode == 0, done.stderr
+    assert all(path.exists() for path in kept) and not any(path.exists() for path in stale)
+    assert done.stdout.count("removing") == len(stale)
+    assert "data/crane/workspace/gone.parquet" in done.stdout
 
 
 def test_linkage_closes_over_the_strokes(geometry):
