@@ -170,6 +170,10 @@ WRONG = [
     ("crane.networks", {}),
     ("crane.tolerance_study.methods", []),
     ("crane.tolerance_study.tolerances", []),
+    ("crane.tolerance_study.tolerances.1", 1.0e-5),
+    ("crane.tolerance_study.methods.1", "direct"),
+    ("crane.fitting.jib", 0.2),
+    ("crane.fitting.payload", 550.0),
     ("crane.fitting.n_hidden", []),
     (INVERSION, None),
     ("crane.methods.direct", 3),
@@ -355,6 +359,13 @@ def test_values_as_yaml_reads_them_are_not_changed_on_the_way(original):
             assert given == found and isinstance(found, bool) == isinstance(given, bool)
 
     compare(original, parameters)
+
+
+@pytest.mark.parametrize("text", ["1e-05", "1E5", "-2.5e+3", ".5e1", "3.e2", "1.0e-5"])
+def test_numbers_that_dvc_writes_are_numbers(tmp_path, text):
+    file = tmp_path / "params.yaml"
+    file.write_text(f"a: {text}\nb: '{text}'\nc: e{text}\n")
+    assert read_yaml(file) == {"a": float(text), "b": text, "c": f"e{text}"}
 
 
 FILES = {

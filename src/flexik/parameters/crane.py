@@ -27,7 +27,10 @@ from flexik.parameters.trainers import Trainer
 LENGTH_TOLERANCE = 1e-9
 
 # Prefixes of metrics, a method of its own, and names that DVC's run cache ignores
-TAKEN_NAMES = ("none", "grid", "selection", "select", "workspace", "calibration", "size", "nfiles")
+TAKEN_NAMES = (
+    *("none", "grid", "selection", "select", "workspace", "calibration"),
+    *("trainers", "methods", "inversion", "size", "nfiles"),
+)
 NETWORK_SECTIONS = (
     *("networks", "modular_networks"),
     *("selected_networks", "selected_modular_networks"),
@@ -70,6 +73,7 @@ class Crane(Model):
     def _consistent(self) -> Self:
         self._check_lengths()
         self._check_strokes()
+        self._check_fitting()
         self._check_names()
         self._check_networks()
         self._check_methods()
@@ -108,9 +112,16 @@ class Crane(Model):
             if stroke > longest:
                 raise ValueError(f"illustration.strokes: {name} beyond the cylinder, {longest} m")
 
+    def _check_fitting(self) -> None:
+        for name in ("jib", "extension", "payload"):
+            axis, value = getattr(self.grid, name), getattr(self.fitting, name)
+            steps = (value - axis.minimum) / axis.increment
+            if not axis.minimum <= value <= axis.maximum or abs(steps - round(steps)) > 1e-6:
+                raise ValueError(f"fitting.{name}: {value} is no value of grid.{name}")
+
     def _check_names(self) -> None:
         known: dict[str, str] = {}
-        for section in (*NETWORK_SECTIONS, "methods"):
+        for section in (*NETWORK_SECTIONS, "trainers", "methods"):
             for label in getattr(self, section):
                 if label in TAKEN_NAMES:
                     raise ValueError(f"{section}.{label}: the name is taken")
@@ -176,8 +187,15 @@ class Crane(Model):
                 )
 
     def _check_evaluation(self) -> None:
-        for name in ("points", "payloads"):
-            values = getattr(self.evaluation, name)
+        lists = {
+            f"{section}.{name}": getattr(getattr(self, section), name)
+            for section, names in (
+                ("evaluation", ("points", "payloads")),
+                ("tolerance_study", ("methods", "tolerances")),
+            )
+            for name in names
+        }
+        for name, values in lists.items():
             for number, value in enumerate(values):
                 if value in values[:number]:
-                    raise ValueError(f"evaluation.{name}.{number}: {value} is there twice")
+                    raise ValueError(f"{name}.{number}: {value} is there twice")

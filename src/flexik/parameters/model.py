@@ -25,16 +25,14 @@ class Model(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _no_text_numbers(cls, data: Any) -> Any:
-        # YAML 1.1 reads 1e-5 as text, which pydantic would turn into a number behind one's back
+        # pydantic would turn text into a number behind one's back
         if isinstance(data, dict):
             for key, value in data.items():
                 for entry in _entries(value):
                     if isinstance(entry, bool):
                         raise ValueError(f"{key}: expected no truth value, got {entry!r}")
                     if isinstance(entry, str) and _is_number(entry):
-                        raise ValueError(
-                            f"{key}: {entry!r} is no YAML number (write 1.0e-5, 1.0e+6)"
-                        )
+                        raise ValueError(f"{key}: expected a number, got the text {entry!r}")
         return data
 
 

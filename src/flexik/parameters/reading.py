@@ -1,6 +1,7 @@
 """Reading and validating params.yaml."""
 
 import json
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
@@ -77,10 +78,11 @@ def validate(data: dict[str, Any], source: str = PARAMETERS_FILE) -> Parameters:
 
 def _without_tags(location: list[str]) -> list[str]:
     """The keys of a location, without the kind pydantic adds where a section has several."""
+    before = ["", "", *location]
     tags = {
         k
         for k in range(len(location))
-        if location[k - 1] == "inversion" or (k > 1 and location[k - 2] in ("trainers", "methods"))
+        if before[k + 1] == "inversion" or before[k] in ("trainers", "methods")
     }
     return [part for k, part in enumerate(location) if k not in tags]
 
@@ -118,4 +120,10 @@ def _unique_mapping(loader: _UniqueKeyLoader, node: yaml.MappingNode) -> dict[An
     return loader.construct_mapping(node, deep=True)
 
 
+# numbers like 1e-05, which YAML 1.2 and DVC know and write, and YAML 1.1 takes for text
+_UniqueKeyLoader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)[eE][-+]?[0-9]+$"),
+    list("-+.0123456789"),
+)
 _UniqueKeyLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _unique_mapping)
