@@ -4,8 +4,8 @@ Reads params.yaml: crane; what the other crane stages wrote; the published value
 the benchmarks wrote.
 Writes reports/crane/: positioning_errors, positioning_errors_selected, positioning_errors_variants,
 without_worst_points, inversions, tolerance_study, query_cost, workspace, calibration, mesh_study,
-training, size_rules and size_selection/ (CSV and Markdown), errors.csv with every test condition of
-every method, metrics.json, figures/ and README.md.
+training, training_race, size_rules and size_selection/ (CSV and Markdown), errors.csv with every
+test condition of every method, metrics.json, figures/ and README.md.
 """
 
 from pathlib import Path

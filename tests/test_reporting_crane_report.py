@@ -284,6 +284,23 @@ def test_tolerances_stand_beside_the_published(results, tmp_path):
     assert table["failed"].tolist() == [0, 1]
 
 
+def test_errors_of_trainers_after_some_times(results, tmp_path):
+    curves = pd.DataFrame(
+        {
+            "trainer": ["fast"] * 3 + ["slow"] * 2,
+            "seconds": [0.05, 0.5, 2.0, 0.2, 50.0],
+            "error": [0.3, 0.2, 0.1, 0.9, 0.4],
+        }
+    )
+    results = dataclasses.replace(results, training_curves=curves)
+    crane_tables._write_training_race(results, tmp_path)
+    table = pd.read_csv(tmp_path / "training_race.csv").set_index("trainer")
+    times = ["after 0.1 s", "after 1 s", "after 10 s", "after 60 s"]
+    assert table.loc["fast", times].tolist() == [0.3, 0.2, 0.1, 0.1]
+    assert table.loc["slow", times].fillna(0).tolist() == [0.0, 0.9, 0.9, 0.4]
+    assert table["ended after (s)"].tolist() == [2.0, 50.0]
+
+
 def test_metrics_tell_conditions_and_workspace(results, crane):
     errors = pd.DataFrame({"error_x": [0.003, 0.0], "error_y": [0.004, 0.001], "status": [0, 3]})
     errors["error"] = np.hypot(errors["error_x"], errors["error_y"])

@@ -154,9 +154,8 @@ def _training(folder: Path) -> page.Section:
     return page.Section(
         "Training",
         "Levenberg-Marquardt against back-propagation (equations 49 to 54, pattern and batch mode) "
-        "on the deflection network of published size. Measured apart from the pipeline "
-        "(`make benchmark-positioning`, [details](../benchmarks/training_methods.md)).",
-        [folder / "training.md"],
+        "on the deflection network of published size.",
+        [folder / "training_race.md", folder / "training.md"],
         [(folder / "figures/training_race.png", "Training error against time.")],
     )
 
