@@ -21,7 +21,7 @@ smoke: $(VENV)/.pipeline ## the same pipeline on a tiny configuration, in a temp
 	$(BIN)/python profiles/run.py profiles/smoke.yaml
 
 test: $(VENV)/.dev ## all tests
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadgroup
 
 lint: $(VENV)/.dev ## formatting, lint and types
 	$(BIN)/ruff format --check .

@@ -7,6 +7,7 @@ Only the commanding is timed: targets, payloads and current strokes in, strokes 
 Needs `make repro` for data/crane. Writes reports/benchmarks/positioning.csv and .md.
 """
 
+import math
 import os
 import statistics
 import time
@@ -23,7 +24,7 @@ from training_race import pinned_pool
 
 from flexik import parameters, stage
 from flexik.datasets.evaluations import TARGET_FIELDS
-from flexik.datasets.provenance import network_checksum, targets_checksum
+from flexik.datasets.provenance import network_checksum, query_checksum, targets_checksum
 from flexik.datasets.tables import read_table
 from flexik.errors import DataError
 from flexik.evaluation.conditions import Conditions, all_conditions, random_conditions
@@ -127,7 +128,9 @@ def seconds_single(method: Method, queries: Queries) -> float:
 
 
 def seconds_batched(method: Method, queries: Queries) -> float:
-    """Seconds of a call with all `queries`, over their number."""
+    """Seconds of a call with all `queries`, over their number; nan without any."""
+    if not len(queries):
+        return math.nan
     started = time.perf_counter()
     method(queries.targets, queries.payload, queries.strokes)
     return (time.perf_counter() - started) / len(queries)
@@ -146,6 +149,7 @@ def measure() -> pd.DataFrame:
                 alone = seconds_single(case.method, case.single)
                 seconds[name].append((alone, seconds_batched(case.method, case.batch)))
             print(f"positioning, repeat {repeat + 1} of {N_REPEATS}", flush=True)
+    crane = load_parameters().crane
     rows = []
     for name, pairs in seconds.items():
         alone, batched = (
@@ -158,6 +162,7 @@ def measure() -> pd.DataFrame:
                 "microseconds_batched": batched,
                 "n_single": len(known[name].single),
                 "n_batched": len(known[name].batch),
+                "settings": query_checksum(crane, name),
             }
         )
     return pd.DataFrame(rows)

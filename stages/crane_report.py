@@ -3,9 +3,10 @@
 Reads params.yaml: crane; what the other crane stages wrote; the published values; the timings that
 the benchmarks wrote.
 Writes reports/crane/: positioning_errors, positioning_errors_selected, positioning_errors_variants,
-without_worst_points, inversions, tolerance_study, query_cost, workspace, calibration, mesh_study,
-training, training_race, size_rules and size_selection/ (CSV and Markdown), errors.csv with every
-test condition of every method, metrics.json, figures/ and README.md.
+without_worst_points, inversions, tolerance_study, query_cost, workspace, measured_errors,
+measured_reference_errors, adaptation, calibration, mesh_study, training, training_race, size_rules
+and size_selection/ (CSV and Markdown), errors.csv with every test condition of every method,
+metrics.json, figures/ and README.md.
 """
 
 from pathlib import Path
@@ -15,25 +16,35 @@ import pandas as pd
 from flexik import parameters, stage
 from flexik.datasets.crane import FIELDS
 from flexik.datasets.crane_learning import FITTING_FIELDS
-from flexik.datasets.evaluations import TOLERANCE_FIELDS, read_evaluation
+from flexik.datasets.evaluations import (
+    ADAPTATION_FIELDS,
+    MEASURED_FIELDS,
+    TOLERANCE_FIELDS,
+    read_evaluation,
+)
 from flexik.datasets.provenance import (
     evaluation_checksum,
     fitting_checksum,
     grid_checksum,
+    measured_checksum,
     network_checksum,
+    query_checksum,
     selection_checksum,
     tolerance_checksum,
     workspace_checksum,
 )
 from flexik.datasets.tables import read_csv, read_table
+from flexik.errors import DataError
 from flexik.files import read_json
 from flexik.learning.size_selection import FIELDS as STUDY_FIELDS
 from flexik.learning.size_selection import by_size, read_choice
 from flexik.learning.storage import load_network
 from flexik.multibody.assembly import read_spring_stiffness
 from flexik.parameters import load_parameters
+from flexik.reporting.campaign_tables import PUBLISHED_COLUMNS
 from flexik.reporting.crane_report import write_report
 from flexik.reporting.crane_results import Published, Results
+from flexik.reporting.measured_report import Measured
 
 DATA, REPORTS = Path("data/crane"), Path("reports/crane")
 BENCHMARKS, REFERENCE = Path("reports/benchmarks"), Path("data/reference/crane")
@@ -43,6 +54,8 @@ PUBLISHED = (
     "without_worst_points",
     "tolerance_study",
     "operations",
+    "measured_errors",
+    "measured_reference_errors",
 )
 MESH_COLUMNS = (
     "n_samples",
@@ -85,14 +98,11 @@ def main() -> None:
         },
         tolerances=read_table(DATA / "tolerance_study.parquet", TOLERANCE_FIELDS, tolerances_made),
         fitting=read_table(DATA / "fitting.parquet", FITTING_FIELDS, fitting_made),
-        query_times=read_csv(
-            BENCHMARKS / "positioning.csv",
-            ("microseconds_single", "microseconds_batched"),
-            ("method",),
-        ),
+        query_times=query_times(crane),
         training_curves=read_csv(
             BENCHMARKS / "training_methods.csv", ("seconds", "error"), ("trainer",)
         ),
+        measured=measured(crane, stiffness),
         shape=read_json(DATA / "shape.json"),
     )
     write_report(results, REPORTS, [REFERENCE / f"{name}.csv" for name in PUBLISHED])
@@ -119,17 +129,55 @@ def studies(crane: parameters.Crane, stiffness: float) -> dict[str, tuple[pd.Dat
     return found
 
 
+def query_times(crane: parameters.Crane) -> pd.DataFrame:
+    """Times of the methods that were measured with the settings they have now."""
+    path, columns = BENCHMARKS / "positioning.csv", ("microseconds_single", "microseconds_batched")
+    table = read_csv(path, columns, ("method", "settings"), ("method",))
+    for name in columns:
+        if (table[name] <= 0).any():
+            raise DataError(f"{path}, column {name}: expected positive times")
+    known = ("none", *crane.methods)
+    current = [
+        method in known and settings == query_checksum(crane, method)
+        for method, settings in zip(table["method"], table["settings"], strict=True)
+    ]
+    return table[current]
+
+
+def measured(crane: parameters.Crane, stiffness: float) -> Measured:
+    """Campaign and adaptation."""
+    made_with = measured_checksum(crane, stiffness)
+    return Measured(
+        crane.measured,
+        read_table(DATA / "measured.parquet", MEASURED_FIELDS, made_with),
+        read_table(DATA / "adaptation.parquet", ADAPTATION_FIELDS, made_with),
+        {
+            name: read_csv(
+                REFERENCE / f"{name}.csv", PUBLISHED_COLUMNS, ("statistic",), ("statistic",)
+            )
+            for name in ("measured_errors", "measured_reference_errors")
+        },
+    )
+
+
 def published() -> Published:
     """Values of the thesis."""
-    sizes = read_csv(REFERENCE / "network_sizes.csv", ("n_hidden",), ("network",))
-    operations = read_csv(REFERENCE / "operations.csv", ("operations",), ("method",))
+    sizes = read_csv(REFERENCE / "network_sizes.csv", ("n_hidden",), ("network",), ("network",))
+    operations = read_csv(REFERENCE / "operations.csv", ("operations",), ("method",), ("method",))
+    methods = ("none", "combined", "direct", "modular", "inverse")
     points = ("x", "y", "max_error", "mean_error")
     iterations = ("tolerance", "mean_iterations", "max_iterations", "error_ratio")
     return Published(
-        errors=read_csv(REFERENCE / "positioning_errors.csv", ("none",), ("statistic",)),
+        errors=read_csv(
+            REFERENCE / "positioning_errors.csv", methods, ("statistic",), ("statistic",)
+        ),
         sizes=dict(zip(sizes["network"], sizes["n_hidden"], strict=True)),
-        without_worst=read_csv(REFERENCE / "without_worst_points.csv", points, ("method",)),
-        tolerances=read_csv(REFERENCE / "tolerance_study.csv", iterations, ("method",)),
+        without_worst=read_csv(
+            REFERENCE / "without_worst_points.csv", points, ("method",), ("method", "x", "y")
+        ),
+        tolerances=read_csv(
+            REFERENCE / "tolerance_study.csv", iterations, ("method",), ("method", "tolerance")
+        ),
         operations=dict(zip(operations["method"], operations["operations"], strict=True)),
     )
 

@@ -52,6 +52,13 @@ def check_crane(crane: parameters.Crane) -> None:
             f"params.yaml: crane.evaluation.points.{number}: the rigid crane does not reach "
             f"({x:g}, {y:g}) m" + (f", nor {missed.sum() - 1} others" if missed.sum() > 1 else "")
         )
+    space = crane.workspace
+    raster = np.array(
+        [(x, y) for x in np.linspace(*space.x, 60) for y in np.linspace(*space.y, 60)]
+    )
+    raster = raster[raster[:, 0] >= crane.grid.minimum_tip_x]
+    if np.isnan(smallest_extension(geometry, raster)).all():
+        raise ParameterError("params.yaml: crane.workspace: the crane reaches nothing in x, y")
 
 
 def remove_stale(crane: parameters.Crane) -> None:

@@ -29,6 +29,9 @@ from smoke_pipeline import (
 from flexik.datasets.tables import read_table, stored_fields
 from flexik.parameters import PARAMETERS_FILE
 
+# one process, which makes the project once
+pytestmark = pytest.mark.xdist_group("pipeline")
+
 
 def test_run_again_it_does_nothing(project):
     before = snapshot(project)
@@ -263,7 +266,8 @@ def test_killed_and_run_again_generates_the_same_bytes(copy, tmp_path):
 
 def test_too_many_failed_samples_end_the_stage(copy):
     # no crane holds the heavier half
-    edit(copy, crane__grid__payload={"minimum": 100.0, "maximum": 1.0e7, "increment": 9.9999e6})
+    payload = {"minimum": 100.0, "maximum": 1.0e7, "increment": 9.9999e6}
+    edit(copy, crane__grid__payload=payload, crane__fitting__payload=100.0)
     (copy / "data/crane/grid.parquet").unlink()
     done = stage(copy, "crane_generate.py")
     assert done.returncode == 1

@@ -25,6 +25,9 @@ STATISTICS = (
 # Targets of the workspace that the smoke profile gives a method
 N_TARGETS = {label: 5 if label == "combined_ga" else 40 for label in METHODS}
 
+# one process, which makes the project once
+pytestmark = pytest.mark.xdist_group("pipeline")
+
 
 def test_metrics_hold_every_number_by_its_name(project):
     metrics = json.loads((project / "reports/crane/metrics.json").read_text())

@@ -13,7 +13,14 @@ from flexik.learning.perceptron import Network, Normalisation, Quantity
 from flexik.mechanisms.crane import STROKE_LIMIT
 from flexik.parameters import load_parameters
 from flexik.positioning.method import NOT_CONVERGED
-from flexik.reporting import crane_notes, crane_report, crane_results, crane_tables
+from flexik.reporting import (
+    crane_notes,
+    crane_report,
+    crane_results,
+    crane_tables,
+    learning_tables,
+    measured_report,
+)
 
 ROOT = Path(__file__).parents[1]
 
@@ -61,6 +68,7 @@ def results(crane):
         operations={"inverse": 395.0},
     )
     nothing = pd.DataFrame()
+    measured = measured_report.Measured(crane.measured, nothing, nothing, {})
     return crane_results.Results(
         crane=crane,
         spring_stiffness=8e6,
@@ -83,6 +91,7 @@ def results(crane):
             }
         ),
         training_curves=nothing,
+        measured=measured,
         shape={},
     )
 
@@ -293,7 +302,7 @@ def test_errors_of_trainers_after_some_times(results, tmp_path):
         }
     )
     results = dataclasses.replace(results, training_curves=curves)
-    crane_tables._write_training_race(results, tmp_path)
+    learning_tables._write_training_race(results, tmp_path)
     table = pd.read_csv(tmp_path / "training_race.csv").set_index("trainer")
     times = ["after 0.1 s", "after 1 s", "after 10 s", "after 60 s"]
     assert table.loc["fast", times].tolist() == [0.3, 0.2, 0.1, 0.1]
@@ -301,7 +310,8 @@ def test_errors_of_trainers_after_some_times(results, tmp_path):
     assert table["ended after (s)"].tolist() == [2.0, 50.0]
 
 
-def test_metrics_tell_conditions_and_workspace(results, crane):
+def test_metrics_tell_conditions_and_workspace(results, monkeypatch):
+    monkeypatch.setattr(measured_report, "metrics", lambda measured: {"measured.x": 1.0})
     errors = pd.DataFrame({"error_x": [0.003, 0.0], "error_y": [0.004, 0.001], "status": [0, 3]})
     errors["error"] = np.hypot(errors["error_x"], errors["error_y"])
     table = pd.DataFrame({"status": [0, 1, 0]})
@@ -319,6 +329,7 @@ def test_metrics_tell_conditions_and_workspace(results, crane):
     assert found["none.workspace_p99_error_mm"] == pytest.approx(4.96)
     assert found["none.workspace_n_failed"] == 1
     assert not any(name.startswith("new.workspace") for name in found)
+    assert found["measured.x"] == 1.0
     assert found["grid.n_samples"] == 3 and found["grid.n_left_out"] == 1
 
 
@@ -335,17 +346,17 @@ def test_what_each_kind_of_method_does_is_told(crane):
 def test_the_size_table_tells_the_choice(results, tmp_path, chosen, at_the_end):
     (name, selected), *_ = results.crane.selected_networks.items()
     sizes = pd.DataFrame(
-        {column: np.array([0.3, 0.2, 0.1]) for column in crane_tables.SIZE_TABLE}
+        {column: np.array([0.3, 0.2, 0.1]) for column in learning_tables.SIZE_TABLE}
         | {"n_hidden": [4, 5, 6], "best_restart": [0, 2, 1], "n_failed": 0, "unused": 1.0}
     )
     results = dataclasses.replace(results, studies={name: (sizes, chosen)})
-    crane_tables._write_sizes(results, name, tmp_path)
+    learning_tables._write_sizes(results, name, tmp_path)
     text = (tmp_path / "size_selection" / f"{name}.md").read_text()
     assert text.startswith(f"{name}: ") and f"of {selected.select.n_restarts} by" in text
     published = results.crane.networks["deflection"].n_hidden
     assert f"- chosen: {chosen}, published: {published}\n" in text
     assert ("end of the range" in text) == at_the_end
     table = pd.read_csv(tmp_path / "size_selection" / f"{name}.csv")
-    assert list(table) == [column.replace("_", " ") for column in crane_tables.SIZE_TABLE]
+    assert list(table) == [column.replace("_", " ") for column in learning_tables.SIZE_TABLE]
     assert table["selection error"].tolist() == [0.3, 0.2, 0.1]
     assert table["n hidden"].tolist() == [4, 5, 6]

@@ -35,6 +35,19 @@ TOLERANCE_FIELDS = (
     Field("n_failed", "1", "searches that ended above their tolerance", "int64"),
 )
 
+MEASURED_FIELDS = (
+    Field("method", "1", "none or combined", "string"),
+    *CONDITION_FIELDS[1:7],
+    Field("measured_x", "m", "where the tip came to rest, forward of the slew axis"),
+    Field("measured_y", "m", "where the tip came to rest, above ground"),
+)
+ADAPTATION_FIELDS = (
+    Field("twin", "1", "number of the crane as built, from 0", "int64"),
+    Field("n_measurements", "1", "measurements learnt from; 0: not adapted", "int64"),
+    *CONDITION_FIELDS[1:4],
+    Field("error", "m", "distance of the tip from the target"),
+)
+
 
 def write_evaluation(path: Path | str, frame: pd.DataFrame, parameters_checksum: str) -> None:
     """Write `frame` of evaluation.errors.evaluate; a method's diagnostics follow the errors.

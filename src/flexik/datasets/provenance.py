@@ -39,6 +39,19 @@ def network_checksum(crane: parameters.Crane, spring_stiffness: float, name: str
     return checksum(*parts)
 
 
+def query_checksum(crane: parameters.Crane, label: str) -> str:
+    """Checksum of the settings that the time of a query of method `label` depends on."""
+    if label == "none":
+        return parameters_checksum([crane.geometry])
+    method = crane.methods[label]
+    sections: list[parameters.Section] = [
+        crane.geometry,
+        method,
+        crane.all_networks[method.network],
+    ]
+    return parameters_checksum(sections)
+
+
 def fitting_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
     """Checksum of everything that determines the networks on a thinned grid."""
     sections: list[parameters.Section] = [crane.fitting, crane.trainers[crane.fitting.trainer]]
@@ -74,6 +87,15 @@ def tolerance_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
     for label in crane.tolerance_study.methods:
         parts += _method_parts(crane, spring_stiffness, label, [])
     return checksum(*parts)
+
+
+def measured_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
+    """Checksum of everything that determines the campaign and what is learnt from measurements."""
+    measured = crane.measured
+    sections: list[parameters.Section] = [measured]
+    parts = _method_parts(crane, spring_stiffness, measured.method, sections)
+    parts += _method_parts(crane, spring_stiffness, measured.adaptation.method, [])
+    return checksum(*parts, file_checksum(measured.file))
 
 
 def _method_parts(

@@ -206,10 +206,12 @@ def _write_rows(path: Path | str, schema: pa.Schema, tables: Iterable[pa.Table])
             writer.write_table(rows, row_group_size=ROWS_PER_GROUP)
 
 
-def read_csv(path: Path | str, columns: Sequence[str], texts: Sequence[str] = ()) -> pd.DataFrame:
+def read_csv(
+    path: Path | str, columns: Sequence[str], texts: Sequence[str] = (), keys: Sequence[str] = ()
+) -> pd.DataFrame:
     """CSV table `path` with at least the numbers `columns` and the texts `texts`.
 
-    Raises DataError if it is missing, damaged or has no row.
+    Raises DataError if it is missing, damaged or has no row, or two rows with the same `keys`.
     """
     try:
         table = pd.read_csv(path)
@@ -223,6 +225,9 @@ def read_csv(path: Path | str, columns: Sequence[str], texts: Sequence[str] = ()
             raise DataError(f"{path}, column {name}: expected numbers")
     if table.empty:
         raise DataError(f"{path}: expected at least one row")
+    if keys and (again := table.duplicated(list(keys))).any():
+        number = int(np.flatnonzero(again)[0])
+        raise DataError(f"{path}, row {number + 1}: its {', '.join(keys)} stand in a row before")
     return table
 
 

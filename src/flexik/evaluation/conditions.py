@@ -21,6 +21,9 @@ class Conditions:
     def __len__(self) -> int:
         return len(self.targets)
 
+    def __getitem__(self, rows: slice) -> "Conditions":
+        return Conditions(self.targets[rows], self.payload[rows], self.point_index[rows])
+
 
 def all_conditions(points: ArrayLike, payloads: ArrayLike) -> Conditions:
     """All of `points` (k, 2) in m with all of `payloads` (p,) in kg, m = k p.

@@ -4,7 +4,7 @@ Pillar, lift arm, jib and extension are beams; cylinders, rocker and coupler are
 extension slides in the jib on two pads; a torsion spring holds the pillar to the ground.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import exudyn as exu
@@ -12,9 +12,17 @@ import numpy as np
 from exudyn import itemInterface as item
 
 from flexik.errors import SolverError
-from flexik.mechanisms.crane import CraneGeometry, CranePose, Vector, pose
+from flexik.mechanisms.crane import CranePose, Vector, pose
 from flexik.multibody.elements import place_beam
-from flexik.multibody.structure import Array, CraneStructure, Elements, Rod, discretise
+from flexik.multibody.structure import (
+    SLIDING,
+    Array,
+    Elements,
+    FlexibleCrane,
+    Meshes,
+    Rod,
+    beam_meshes,
+)
 
 # Newton's residual, N and N m: it falls quadratically onto a round-off floor of about 1e-4 (stiff
 # axial terms); one step after passing this tolerance the solution is on the floor
@@ -23,32 +31,8 @@ NEWTON_TOLERANCE = 1e-2
 # Share of the load below which a stubborn equilibrium is given up
 SMALLEST_LOAD_STEP = 0.05
 
-BEAMS = ("pillar", "lift", "jib", "extension")
-# Beams whose mesh depends on the extension stroke: the pads slide on them
-SLIDING = ("jib", "extension")
-
-Meshes = dict[str, Elements]
-
-
-@dataclass(frozen=True)
-class FlexibleCrane:
-    """A crane whose equilibria can be computed.
-
-    spring_stiffness : of the ground connection, N m/rad.
-    element : one of multibody.elements.ELEMENTS.
-    refinement : every beam is cut into this many times its n_elements.
-    """
-
-    geometry: CraneGeometry
-    structure: CraneStructure
-    spring_stiffness: float
-    element: str = "geometrically_exact"
-    refinement: int = 1
-
-    def rear_pad(self, extension: float) -> float:
-        """Abscissa of the rear pad at stroke `extension`, jib frame, m."""
-        start = self.geometry.extension_start_in_jib[0]
-        return start + extension - self.structure.extension_length
+RODS = ("lift_cylinder", "jib_cylinder", "rocker", "coupler")
+PIVOTS = ("lift_pivot", "jib_pivot")
 
 
 @dataclass(frozen=True)
@@ -69,15 +53,19 @@ class Equilibrium:
 
 
 def solve(
-    crane: FlexibleCrane, strokes: Array, payload: Array
+    crane: FlexibleCrane,
+    strokes: Array,
+    payload: Array,
+    settle: "Callable[[CraneModel, float], None] | None" = None,
 ) -> tuple[Array, dict[int, SolverError]]:
     """Tip (n, 2) in m at `strokes` (n, 3) in m with `payload` (n,) in kg, and the rows that failed.
 
     Rows in a run of equal strokes are solved one from the other; rows whose meshes have the same
     layout share one system. Each run of strokes starts from the unloaded pose. A row without
     equilibrium holds NaN and is in the second result, with an error that names its strokes and
-    payload.
+    payload. `settle` finds an equilibrium in place of `CraneModel.solve`.
     """
+    settle = settle or CraneModel.solve
     strokes, payload = np.atleast_2d(strokes), np.atleast_1d(payload)
     result = np.full((len(strokes), 2), np.nan)
     failures: dict[int, SolverError] = {}
@@ -86,7 +74,7 @@ def solve(
     for k, (row, mass) in enumerate(zip(strokes, payload, strict=True)):
         if model is None or row[2] != model.extension:
             extension = float(row[2])
-            meshes = _meshes(crane, extension, SLIDING)
+            meshes = beam_meshes(crane, extension, SLIDING)
             layout = tuple((len(mesh.stations), *mesh.pins) for mesh in meshes.values())
             if layout in models:
                 models[layout].extend(extension, meshes)
@@ -96,7 +84,7 @@ def solve(
         try:
             if not np.array_equal(row, model.strokes):
                 model.place(row)
-            model.solve(float(mass))
+            settle(model, float(mass))
             result[k] = model.tip()
         except SolverError as error:
             failures[k] = error
@@ -140,7 +128,7 @@ class CraneModel:
         self.crane, self.extension = crane, extension
         self._container = exu.SystemContainer()
         self.system = self._container.AddSystem()
-        meshes = _meshes(crane, extension)
+        meshes = beam_meshes(crane, extension)
         self.beams = {
             name: place_beam(self.system, crane.element, mesh, np.zeros(2), 0.0)
             for name, mesh in meshes.items()
@@ -176,19 +164,34 @@ class CraneModel:
         """
         rigid = pose(self.crane.geometry, strokes[None])
         if not np.isfinite(rigid.tip).all():
-            raise SolverError(f"strokes {_listed(strokes)} m: the linkage cannot be assembled")
+            raise SolverError(f"strokes {listed(strokes)} m: the linkage cannot be assembled")
         self.strokes = strokes
         for name, (origin, angle) in self._frames(rigid).items():
             self.beams[name].move(origin, angle)
         self.system.SetNodeParameter(self._head, "referenceCoordinates", list(rigid.rocker_head[0]))
         geometry = self.crane.geometry
-        for name, length in (
-            ("lift_cylinder", geometry.lift_cylinder_length + strokes[0]),
-            ("jib_cylinder", geometry.jib_cylinder_length + strokes[1]),
-        ):
-            self.system.SetObjectParameter(self._connectors[name], "distance", length)
+        self._lengths = {
+            "lift_cylinder": geometry.lift_cylinder_length + strokes[0],
+            "jib_cylinder": geometry.jib_cylinder_length + strokes[1],
+            "rocker": geometry.rocker_length,
+            "coupler": geometry.coupler_length,
+        }
+        self.seat(dict.fromkeys(RODS, 0.0), dict.fromkeys(PIVOTS, np.zeros(2)))
         self.system.AssembleInitializeSystemCoordinates()
         self._solved: list[tuple[float, Array, Array]] = []
+
+    def seat(self, rods: Mapping[str, float], pivots: Mapping[str, Array]) -> None:
+        """Put pins off their places until the model is placed anew or seated again.
+
+        Each of RODS becomes longer by `rods` in m; the outer body of each of PIVOTS hangs `pivots`
+        (2,) in m, ground frame, off the pin of the inner one.
+        """
+        for name, longer in rods.items():
+            length = self._lengths[name] + longer
+            self.system.SetObjectParameter(self._connectors[name], "distance", length)
+        for name, by in pivots.items():
+            beam, marker, _ = self._pivots[name]
+            self.beams[beam].shift(marker, by)
 
     def solve(self, payload: float) -> None:
         """Find the equilibrium with `payload` in kg, starting from the last solutions."""
@@ -204,7 +207,7 @@ class CraneModel:
             self.system.AssembleInitializeSystemCoordinates()  # back to the unloaded pose
             self._solved = []
             raise SolverError(
-                f"no static equilibrium at strokes {_listed(self.strokes)} m with {payload:g} kg"
+                f"no static equilibrium at strokes {listed(self.strokes)} m with {payload:g} kg"
             )
         self._solved = [*self._solved[-1:], (payload, *solution)]
 
@@ -223,6 +226,17 @@ class CraneModel:
         """Tip (2,) in m of the last solution."""
         node = self.beams["extension"].nodes[-1]
         return np.array(self.system.GetNodeOutput(node, exu.OutputVariableType.Position)[:2])
+
+    def pin_forces(self) -> tuple[dict[str, float], dict[str, Array]]:
+        """Tension of RODS in N, and force (2,) in N of the inner on the outer body of PIVOTS."""
+        data = self.system.systemData
+        # a revolute joint reports no force either: its multipliers are it
+        multipliers = np.array(data.GetAECoordinates())
+        joints = {name: joint for name, (_, _, joint) in self._pivots.items()}
+        return (
+            {name: -self._force(self._connectors[name]) for name in RODS},
+            {name: multipliers[data.GetObjectLTGAE(joint)] for name, joint in joints.items()},
+        )
 
     def equilibrium(self) -> Equilibrium:
         """Shapes and forces of the last solution."""
@@ -275,8 +289,11 @@ class CraneModel:
         rear_pad = self.crane.rear_pad(self.extension)
         self._rear_pad = self._on_jib((rear_pad, height))
         self._front_pad = extension.marker(structure.front_pad - rear_pad)
-        self._pin(self._on_pillar((0.0, 0.0)), self._on_lift((0.0, 0.0)))
-        self._pin(self._on_lift(geometry.jib_pivot), self._on_jib((0.0, 0.0)))
+        # beam and marker of the pin, and its joint
+        pin = self._on_pillar((0.0, 0.0))
+        self._pivots = {"lift_pivot": ("pillar", pin, self._pin(pin, self._on_lift((0.0, 0.0))))}
+        pin = self._on_lift(geometry.jib_pivot)
+        self._pivots["jib_pivot"] = ("lift", pin, self._pin(pin, self._on_jib((0.0, 0.0))))
         self._pin(self._rear_pad, extension.marker(0.0))
         pad = item.ObjectJointPrismatic2D(
             markerNumbers=[self._front_pad, self._on_jib((structure.front_pad, height))],
@@ -309,8 +326,8 @@ class CraneModel:
     def _on_jib(self, point: Vector) -> int:
         return self.beams["jib"].marker(point[0], point[1] - self.crane.structure.jib_axis_height)
 
-    def _pin(self, a: int, b: int) -> None:
-        self.system.AddObject(item.ObjectJointRevolute2D(markerNumbers=[a, b]))
+    def _pin(self, a: int, b: int) -> int:
+        return self.system.AddObject(item.ObjectJointRevolute2D(markerNumbers=[a, b]))
 
     def _rod(self, a: int, b: int, length: float) -> int:
         rod = item.ObjectConnectorDistance(markerNumbers=[a, b], distance=length)
@@ -345,22 +362,6 @@ class CraneModel:
         return float(np.atleast_1d(force)[0])
 
 
-def _meshes(crane: FlexibleCrane, extension: float, names: Sequence[str] = BEAMS) -> Meshes:
-    """Meshes of the beams `names` at stroke `extension` in m, with a node at every pin and pad."""
-    geometry, rear_pad = crane.geometry, crane.rear_pad(extension)
-    pins = {
-        "pillar": (geometry.lift_pivot[1] + geometry.lift_cylinder_base[1],),
-        "lift": (
-            geometry.lift_cylinder_head[0],
-            geometry.jib_cylinder_base_in_lift[0],
-            geometry.rocker_pivot_in_lift[0],
-        ),
-        "jib": (geometry.coupler_pin[0], 0.0, rear_pad),
-        "extension": (crane.structure.front_pad - rear_pad,),
-    }
-    return {n: discretise(getattr(crane.structure, n), pins[n], crane.refinement) for n in names}
-
-
 def _settings() -> exu.SimulationSettings:
     settings = exu.SimulationSettings()
     settings.solution.file.write = False
@@ -380,7 +381,8 @@ def _shift(point: Array, angle: float, along: float, left: float) -> Array:
     return point + np.array([c * along - s * left, s * along + c * left])
 
 
-def _listed(values: Array) -> str:
+def listed(values: Array) -> str:
+    """Numbers in parentheses, for messages."""
     return "(" + ", ".join(f"{v:.6g}" for v in values) + ")"
 
 

@@ -59,9 +59,28 @@ class PlacedBeam:
         k, _, offset = self._markers[marker]
         self._put(marker, k, abscissa - self.stations[k], offset)
 
+    def shift(self, marker: int, by: Array) -> None:
+        """Hold a marker `by` (2,) in m, ground frame, off its place; the next shift replaces it."""
+        node, ahead, offset = self._markers[marker]
+        if by.any():
+            c, s = self._direction(node)
+            ahead, offset = ahead + c * by[0] + s * by[1], offset - s * by[0] + c * by[1]
+        self._set_position(marker, node, ahead, offset)
+
+    def _direction(self, node: int) -> tuple[float, float]:
+        """Cosine and sine of the rotation of a node in the current solution."""
+        number = self.nodes[node]
+        moved = self.system.GetNodeOutput(number, exu.OutputVariableType.Coordinates)
+        turned = np.add(moved, self.system.GetNodeParameter(number, "referenceCoordinates"))[2:]
+        angle = np.arctan2(turned[1], turned[0]) if self.ancf else turned[0]
+        return float(np.cos(angle)), float(np.sin(angle))
+
     def _put(self, marker: int, node: int, ahead: float, offset: float) -> None:
-        """Place a marker relative to its node; bodies of ANCF markers begin at the node before."""
         self._markers[marker] = (node, ahead, offset)
+        self._set_position(marker, node, ahead, offset)
+
+    def _set_position(self, marker: int, node: int, ahead: float, offset: float) -> None:
+        """Place a marker relative to its node; bodies of ANCF markers begin at the node before."""
         start = self.stations[node] - self.stations[max(node - 1, 0)] if self.ancf else 0.0
         self.system.SetMarkerParameter(marker, "localPosition", [start + ahead, offset, 0.0])
 

@@ -1,6 +1,7 @@
 """What bends and weighs, as data, and its reduction to finite elements (NumPy only)."""
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -9,10 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexik.errors import DataError
+from flexik.mechanisms.crane import CraneGeometry
 
 Array = NDArray[np.float64]
 
 SECTION_COLUMNS = ("x_m", "Iz_m4", "A_m2")
+
+BEAMS = ("pillar", "lift", "jib", "extension")
+# Beams whose mesh depends on the extension stroke: the pads slide on them
+SLIDING = ("jib", "extension")
 
 # Below this distance two stations of a beam share a node: short elements are so stiff that the
 # round-off floor of the solver rises above its tolerance, m
@@ -103,6 +109,27 @@ class CraneStructure:
 
 
 @dataclass(frozen=True)
+class FlexibleCrane:
+    """A crane whose equilibria can be computed.
+
+    spring_stiffness : of the ground connection, N m/rad.
+    element : one of multibody.elements.ELEMENTS.
+    refinement : every beam is cut into this many times its n_elements.
+    """
+
+    geometry: CraneGeometry
+    structure: CraneStructure
+    spring_stiffness: float
+    element: str = "geometrically_exact"
+    refinement: int = 1
+
+    def rear_pad(self, extension: float) -> float:
+        """Abscissa of the rear pad at stroke `extension`, jib frame, m."""
+        start = self.geometry.extension_start_in_jib[0]
+        return start + extension - self.structure.extension_length
+
+
+@dataclass(frozen=True)
 class Elements:
     """Finite elements of a beam: stations (m + 1,) in m, and arrays (m,) over the elements.
 
@@ -120,6 +147,9 @@ class Elements:
     axial_stiffness: Array
     residual_flexibility: Array
     node_mass: Array
+
+
+Meshes = dict[str, Elements]
 
 
 def read_section(path: Path | str) -> Section:
@@ -162,6 +192,22 @@ def discretise(beam: Beam, pins: tuple[float, ...], refinement: int = 1) -> Elem
         n = max(1, int(np.ceil((end - start) / longest - 1e-6)))
         mesh += list(np.linspace(start, end, n + 1)[1:])
     return _reduce(beam, np.array(mesh), pins)
+
+
+def beam_meshes(crane: FlexibleCrane, extension: float, names: Sequence[str] = BEAMS) -> Meshes:
+    """Meshes of the beams `names` at stroke `extension` in m, with a node at every pin and pad."""
+    geometry, rear_pad = crane.geometry, crane.rear_pad(extension)
+    pins = {
+        "pillar": (geometry.lift_pivot[1] + geometry.lift_cylinder_base[1],),
+        "lift": (
+            geometry.lift_cylinder_head[0],
+            geometry.jib_cylinder_base_in_lift[0],
+            geometry.rocker_pivot_in_lift[0],
+        ),
+        "jib": (geometry.coupler_pin[0], 0.0, rear_pad),
+        "extension": (crane.structure.front_pad - rear_pad,),
+    }
+    return {n: discretise(getattr(crane.structure, n), pins[n], crane.refinement) for n in names}
 
 
 def nearest(stations: Array, abscissa: float) -> int:

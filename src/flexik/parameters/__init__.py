@@ -6,6 +6,7 @@ where DVC watches it. The names `size` and `nfiles` are never used: DVC's run ca
 
 from flexik.parameters.crane import Crane
 from flexik.parameters.data import Workspace
+from flexik.parameters.measured import Measured
 from flexik.parameters.methods import CombinedModel, InvertedModel, MethodModel
 from flexik.parameters.model import Model as Section
 from flexik.parameters.networks import (
@@ -31,6 +32,7 @@ __all__ = [
     "CombinedModel",
     "Crane",
     "InvertedModel",
+    "Measured",
     "MethodModel",
     "ModularNetwork",
     "NetworkModel",

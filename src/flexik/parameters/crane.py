@@ -1,12 +1,15 @@
 """The section `crane` of params.yaml."""
 
+import math
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
 from flexik.parameters.data import Evaluation, Grid, Selection, Workspace
+from flexik.parameters.measured import Measured
 from flexik.parameters.methods import (
     NETWORK_KIND,
+    CombinedModel,
     InvertedModel,
     MethodModel,
     ToleranceStudy,
@@ -29,7 +32,7 @@ LENGTH_TOLERANCE = 1e-9
 # Prefixes of metrics, a method of its own, and names that DVC's run cache ignores
 TAKEN_NAMES = (
     *("none", "grid", "selection", "select", "workspace", "calibration"),
-    *("trainers", "methods", "inversion", "size", "nfiles"),
+    *("measured", "trainers", "methods", "inversion", "size", "nfiles"),
 )
 NETWORK_SECTIONS = (
     *("networks", "modular_networks"),
@@ -57,6 +60,7 @@ class Crane(Model):
     workspace: Workspace
     methods: dict[Name, MethodModel]
     tolerance_study: ToleranceStudy
+    measured: Measured
 
     @property
     def all_networks(self) -> dict[str, AnyNetwork]:
@@ -118,6 +122,11 @@ class Crane(Model):
             steps = (value - axis.minimum) / axis.increment
             if not axis.minimum <= value <= axis.maximum or abs(steps - round(steps)) > 1e-6:
                 raise ValueError(f"fitting.{name}: {value} is no value of grid.{name}")
+
+        shape = (getattr(self.grid, name) for name in ("lift", "jib", "extension", "payload"))
+        n_vectors = math.prod(1 + round((a.maximum - a.minimum) / a.increment) for a in shape)
+        if self.fitting.n_samples > n_vectors:
+            raise ValueError(f"fitting.n_samples: the grid has {n_vectors} vectors")
 
     def _check_names(self) -> None:
         known: dict[str, str] = {}
@@ -186,12 +195,25 @@ class Crane(Model):
                     f"network ({', '.join(known) or 'there is none'})"
                 )
 
+        corrections = {
+            "measured.method": self.measured.method,
+            "measured.adaptation.method": self.measured.adaptation.method,
+        }
+        for key, label in corrections.items():
+            if not isinstance(self.methods.get(label), CombinedModel):
+                known = [name for name, m in self.methods.items() if isinstance(m, CombinedModel)]
+                raise ValueError(
+                    f"{key}: {label!r} is no method of kind combined "
+                    f"({', '.join(known) or 'there is none'})"
+                )
+
     def _check_evaluation(self) -> None:
         lists = {
             f"{section}.{name}": getattr(getattr(self, section), name)
             for section, names in (
                 ("evaluation", ("points", "payloads")),
                 ("tolerance_study", ("methods", "tolerances")),
+                ("measured", ("points", "payloads")),
             )
             for name in names
         }

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from flexik.datasets.crane import counts
 from flexik.parameters import parameters_checksum
-from flexik.reporting import crane_notes, page
+from flexik.reporting import crane_notes, measured_report, page
 from flexik.reporting.crane_results import Results
 
 THESIS_FIGURES = {"combined": "4.8", "direct": "4.10", "modular": "4.14", "inverse": "4.18"}
@@ -30,6 +30,7 @@ def write_page(results: Results, folder: Path, inputs: Mapping[str, str]) -> Non
         _workspace(results, folder),
         _inversions(results, folder),
         _cost(folder),
+        measured_report.section(results.measured, folder),
         _training_data(results, folder),
         _training(folder),
         _sizes(results, folder),
@@ -88,7 +89,10 @@ def _workspace(results: Results, folder: Path) -> page.Section:
         f"at {results.crane.grid.payload.minimum:g} kg.",
         [folder / "workspace.md"],
         [
-            (folder / "figures/error_map.png", "Mean error over the working area."),
+            (
+                folder / "figures/error_map.png",
+                "Mean error over the working area (variants left out).",
+            ),
             (folder / "figures/error_distribution.png", "Distribution of the errors."),
         ],
     )
@@ -96,7 +100,7 @@ def _workspace(results: Results, folder: Path) -> page.Section:
 
 def _inversions(results: Results, folder: Path) -> page.Section:
     return page.Section(
-        "Inverting the networks",
+        "Inverting the networks, and other variants",
         "Gradient descent on the inputs is the published way (equations 59 to 63); damped "
         "Gauss-Newton takes a few steps to the solution that gradient descent approaches. What "
         "remains is the error of the network.",

@@ -10,6 +10,7 @@ from flexik.datasets.crane_learning import correction, on_line
 from flexik.evaluation.errors import STATISTICS, comparison, workspace_statistics
 from flexik.files import file_checksum, write_json
 from flexik.mechanisms.crane import CraneGeometry
+from flexik.multibody.assembly import flexible_crane
 from flexik.parameters import ModularNetwork
 from flexik.positioning.initial import initial_positions
 from flexik.reporting import (
@@ -18,6 +19,7 @@ from flexik.reporting import (
     error_figures,
     fitting_figures,
     learning_figures,
+    measured_report,
     method_figures,
 )
 from flexik.reporting.crane_page import write_page
@@ -36,6 +38,8 @@ def write_report(results: Results, folder: Path, published_files: list[Path]) ->
     write_json(folder / "metrics.json", metrics(results))
     write_tables(results, folder)
     _write_figures(results, folder / "figures")
+    nominal = flexible_crane(results.crane, results.spring_stiffness)
+    measured_report.write(results.measured, nominal, folder)
     inputs = {str(path): file_checksum(path) for path in published_files}
     for beam in BEAMS:
         path = getattr(results.crane.structure.beams, beam).section
@@ -60,6 +64,7 @@ def metrics(results: Results) -> dict[str, float]:
         found |= {f"{name}.{key}": value for key, value in counts(table).items()}
     for name, (_, n_hidden) in results.studies.items():
         found[f"select.{name}.n_hidden"] = n_hidden
+    found |= measured_report.metrics(results.measured)
     found["calibration.spring_stiffness_nm_per_rad"] = results.spring_stiffness
     return found
 

@@ -16,6 +16,7 @@ from flexik.evaluation.operations import (
 )
 from flexik.learning.perceptron import Network
 from flexik.parameters import AnyNetwork, CombinedModel, InvertedModel
+from flexik.reporting.measured_report import Measured
 
 SELECTED = "_selected"
 
@@ -54,6 +55,7 @@ class Results:
     fitting : FITTING_FIELDS of datasets.crane_learning.
     query_times : microseconds a query by method, measured by a benchmark.
     training_curves : error against seconds by trainer, measured by a benchmark.
+    measured : campaign and adaptation.
     shape : see reporting.crane_schematic.
     """
 
@@ -72,6 +74,7 @@ class Results:
     fitting: pd.DataFrame
     query_times: pd.DataFrame
     training_curves: pd.DataFrame
+    measured: Measured
     shape: Mapping[str, Any]
 
     @property

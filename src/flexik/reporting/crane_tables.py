@@ -5,31 +5,16 @@ from pathlib import Path
 import pandas as pd
 
 from flexik.datasets.crane import kept
-from flexik.datasets.crane_learning import KINDS, learnt_rows
 from flexik.datasets.evaluations import CONDITION_FIELDS
 from flexik.evaluation.errors import statistics_without, workspace_statistics, worst_points
 from flexik.files import write_text
-from flexik.learning.size_rules import haykin, haykin_samples, oja
-from flexik.mechanisms.crane import CraneGeometry
 from flexik.parameters import InvertedModel
-from flexik.reporting import crane_notes, style, tables
-from flexik.reporting.crane_results import Results
+from flexik.reporting import crane_notes, learning_tables, style, tables
+from flexik.reporting.crane_results import SELECTED, Results
 from flexik.reporting.style import MM
 
-SIZE_TABLE = [
-    "n_hidden",
-    "training_error",
-    "selection_error",
-    "median_selection_error",
-    "worst_selection_error",
-    "best_restart",
-    "n_failed",
-]
 # of the thesis' table of errors
 PUBLISHED_TOLERANCE = 1e-7
-RACE_TIMES = (0.1, 1.0, 10.0, 60.0)  # s
-# share of wrong answers permitted in equation 58
-ERROR_FRACTION = 0.1
 
 
 def write_tables(results: Results, folder: Path) -> None:
@@ -42,11 +27,7 @@ def write_tables(results: Results, folder: Path) -> None:
     _write_workspace(results, folder)
     _write_calibration(results, folder)
     _write_mesh_study(results, folder)
-    _write_training(results, folder)
-    _write_training_race(results, folder)
-    for name in results.studies:
-        _write_sizes(results, name, folder)
-    _write_size_rules(results, folder)
+    learning_tables.write_tables(results, folder)
     columns = [field.name for field in CONDITION_FIELDS]
     every = [frame[columns].assign(method=label) for label, frame in results.errors.items()]
     # micrometres: what another machine may differ in lies below
@@ -59,8 +40,8 @@ def _write_errors(results: Results, folder: Path) -> None:
     found, groups = results.statistics, results.groups
     n = found["none"]["n_conditions"]
     captions = {
-        "published": f"Simulated positioning errors over {n} conditions, networks of published "
-        "size, beside Rouvinen (1999).",
+        "published": f"Simulated positioning errors over {n} conditions, networks of "
+        f"{_sizes_text(results)}, beside Rouvinen (1999).",
         "selected": "The same with networks of selected size.",
         "variants": "The same with other variants.",
     }
@@ -78,7 +59,17 @@ def _write_errors(results: Results, folder: Path) -> None:
             by_method, results.published.errors, results.published_columns
         )
         notes = _errors_notes(results, labels)
+        if group == "selected":
+            notes += _no_better_notes(results, labels)
         tables.write_table(folder / file, errors, 2, captions[group], notes)
+
+
+def _sizes_text(results: Results) -> str:
+    """Whether all networks of the first table have their published size."""
+    networks = [results.crane.methods[label].network for label in results.groups["published"]]
+    sizes = [getattr(results.network(name), "n_hidden", None) for name in networks]
+    published = [results.published_size(name) for name in networks]
+    return "published size" if sizes == published else "the sizes in params.yaml"
 
 
 def _errors_notes(results: Results, labels: list[str]) -> list[str]:
@@ -91,6 +82,23 @@ def _errors_notes(results: Results, labels: list[str]) -> list[str]:
         notes += crane_notes.extrapolation_notes(payload, kept(results.grid)["payload"])
     notes += crane_notes.worse_notes({"none": results.errors["none"], **errors})
     return [*notes, *crane_notes.failure_notes(errors), *crane_notes.genetic_notes(errors)]
+
+
+def _no_better_notes(results: Results, labels: list[str]) -> list[str]:
+    """Methods that the selected size does not improve, with the selection errors."""
+    found, notes = results.statistics, []
+    least = results.training.groupby("network")["selection_error"].min()
+    for label in labels:
+        given = label.removesuffix(SELECTED)
+        if given in found and found[label]["mean_error"] > found[given]["mean_error"]:
+            names = [results.crane.methods[name].network for name in (label, given)]
+            notes.append(
+                f"{label}: no better than {given}; selection errors of the networks: "
+                f"{least[names[0]]:.4f} and {least[names[1]]:.4f}, from "
+                f"{results.network(names[0]).n_restarts} and "
+                f"{results.network(names[1]).n_restarts} starts."
+            )
+    return notes
 
 
 def _write_without_worst(results: Results, folder: Path) -> None:
@@ -172,7 +180,9 @@ def _time(times: pd.DataFrame, label: str, column: str) -> float | None:
 def _times_note() -> str:
     return (
         "us: microseconds a query on one core, measured apart from the pipeline "
-        "(`make benchmark-positioning`, reports/benchmarks/positioning.md); empty: not measured."
+        "(`make benchmark-positioning`, reports/benchmarks/positioning.md): the median over the "
+        "test conditions alone, the mean over random targets in a batch; empty: not measured with "
+        "these settings."
     )
 
 
@@ -197,16 +207,25 @@ def _write_tolerances(results: Results, folder: Path) -> None:
         }
     )
     decimals = {"mean iterations": 1, "published mean": 0, "published max": 0}
-    caption = "Tolerance of the inversion by gradient descent, over all test conditions."
-    notes = [
-        "The learning rate is not published. With a constant one the error falls by the same "
-        "factor in every step, so each further decade takes as many steps as the last; the "
-        "published numbers grow by 15 steps over two decades and by 3 over the next, which no "
-        "constant rate gives.",
-        "Published ratios: of `direct`, 43 % less from 1e-05 to 1e-07 and 3 % less again; of "
-        "`modular`, twice at 1e-05. A tighter tolerance follows the network, not the crane: below "
-        "the network's own error it need not help.",
+    caption = "Tolerance of the inversion, over all test conditions."
+    methods = [results.crane.methods[label] for label in results.crane.tolerance_study.methods]
+    descents = [
+        isinstance(method, InvertedModel) and method.inversion.kind == "gradient_descent"
+        for method in methods
     ]
+    notes = (
+        []
+        if not all(descents)
+        else [
+            "The learning rate is not published. With a constant one the error falls by the same "
+            "factor in every step, so each further decade takes as many steps as the last; the "
+            "published numbers grow by 15 steps over two decades and by 3 over the next, which no "
+            "constant rate gives.",
+            "Published ratios: of `direct`, 43 % less from 1e-05 to 1e-07 and 3 % less again; of "
+            "`modular`, twice at 1e-05. A tighter tolerance follows the network, not the crane: "
+            "below the network's own error it need not help.",
+        ]
+    )
     tables.write_table(folder / "tolerance_study", table, decimals, caption, notes)
 
 
@@ -292,89 +311,3 @@ def _write_mesh_study(results: Results, folder: Path) -> None:
     study = tables.mesh_table(study).assign(**shares)
     decimals = {str(name): 2 if name in shares else 3 for name in study}
     tables.write_table(folder / "mesh_study", study, decimals, caption)
-
-
-def _write_training(results: Results, folder: Path) -> None:
-    caption = (
-        "Every restart of every network: root mean square errors of the normalised outputs on the "
-        "training grid and on the selection set, which chooses. The selection error can be the "
-        "smaller: the grid puts many samples at the ends of strokes and payload, where networks "
-        "fit worst; the selection set is drawn uniformly. Of a modular network, the correction."
-    )
-    decimals = {"training error": 4, "selection error": 4}
-    training = results.training.rename(columns=lambda name: name.replace("_", " "))
-    tables.write_table(folder / "training", training, decimals, caption)
-
-
-def _write_training_race(results: Results, folder: Path) -> None:
-    """Error of each trainer after some times."""
-    rows = []
-    for trainer, curve in results.training_curves.groupby("trainer", sort=False):
-        row: dict[str, object] = {"trainer": trainer}
-        for seconds in RACE_TIMES:
-            done = curve[curve["seconds"] <= seconds]
-            row[f"after {seconds:g} s"] = None if done.empty else done["error"].iloc[-1]
-        last = curve.iloc[-1]
-        rows.append(row | {"at its end": last["error"], "ended after (s)": last["seconds"]})
-    caption = (
-        "Training the deflection network of published size from one start: root mean square error "
-        "of the normalised outputs on the training grid."
-    )
-    notes = [
-        "Measured apart from the pipeline (`make benchmark-positioning`); more starts and how "
-        "back-propagation got its rates: reports/benchmarks/training_methods.md."
-    ]
-    decimals = {f"after {seconds:g} s": 4 for seconds in RACE_TIMES} | {"at its end": 4}
-    table = pd.DataFrame(rows)
-    tables.write_table(folder / "training_race", table, decimals, caption, notes)
-
-
-def _write_sizes(results: Results, name: str, folder: Path) -> None:
-    sizes, chosen = results.studies[name]
-    select = results.crane.studies[name].select
-    caption = (
-        f"{name}: root mean square errors of the normalised outputs by number of hidden neurons; "
-        f"best restart of {select.n_restarts} by selection error."
-    )
-    n_hidden = list(sizes["n_hidden"])
-    notes = [f"chosen: {chosen}, published: {results.published_size(name)}"]
-    if chosen in (n_hidden[0], n_hidden[-1]):
-        notes.append(
-            "The choice lies at the end of the range: a wider range may have a better size."
-        )
-    table = sizes[SIZE_TABLE].rename(columns=lambda column: column.replace("_", " "))
-    decimals = {str(column): 5 for column in table if "error" in str(column)}
-    tables.write_table(folder / "size_selection" / name, table, decimals, caption, notes)
-
-
-def _write_size_rules(results: Results, folder: Path) -> None:
-    """What rules of thumb would have chosen."""
-    geometry = CraneGeometry(**results.crane.geometry.model_dump())
-    grid, rows = kept(results.grid), []
-    for name, (_, chosen) in results.studies.items():
-        kind = results.network(name).kind
-        n_samples = len(learnt_rows(grid, kind, geometry))
-        n_inputs, n_outputs = len(KINDS[kind].inputs), len(KINDS[kind].outputs)
-        rows.append(
-            {
-                "network": name,
-                "learns": kind,
-                "samples": n_samples,
-                "published": results.published_size(name),
-                "chosen": chosen,
-                "Oja (57)": round(oja(n_samples, n_inputs, n_outputs)),
-                "Haykin (58)": haykin(n_samples, n_inputs, n_outputs, ERROR_FRACTION),
-                "samples (58) asks for": round(
-                    haykin_samples(n_inputs, chosen, n_outputs, ERROR_FRACTION)
-                ),
-            }
-        )
-    caption = "Hidden neurons: published, of least selection error, and by two rules of thumb."
-    notes = [
-        "Oja (57): samples over five times inputs and outputs. Haykin (58): the largest network "
-        f"that so many samples allow, for a share of {ERROR_FRACTION:g} of wrong answers; it is "
-        "made for classification, and here allows none. Last column: the samples that it asks for "
-        "with the chosen size.",
-    ]
-    table = pd.DataFrame(rows)
-    tables.write_table(folder / "size_rules", table, 0, caption, notes)

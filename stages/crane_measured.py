@@ -1,0 +1,87 @@
+"""Measure a crane under no compensation and under compensation, as in chapter 4.6 of the thesis.
+
+Reads params.yaml: crane.measured, crane.geometry, crane.structure, the compensating method under
+crane.methods (and crane.grid, crane.selection, networks and trainers to know which network belongs
+to it); data/crane/calibration.json; its network; the file of crane.measured.
+Writes data/crane/measured.parquet, a row for every method, point and payload.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from flexik import parameters, stage
+from flexik.datasets.campaign import read_campaign
+from flexik.datasets.crane import STROKES
+from flexik.datasets.evaluations import MEASURED_FIELDS
+from flexik.datasets.provenance import measured_checksum, network_checksum
+from flexik.datasets.tables import write_table
+from flexik.errors import DataError
+from flexik.evaluation.conditions import all_conditions
+from flexik.learning.storage import load_network
+from flexik.multibody.as_built import Magnitudes, as_built_tips, draw_twin
+from flexik.multibody.assembly import flexible_crane, read_spring_stiffness
+from flexik.parameters import load_parameters
+from flexik.positioning.assembly import crane_method, uncompensated
+from flexik.positioning.initial import initial_positions
+
+FOLDER = Path("data/crane")
+
+
+def main() -> None:
+    """Run the stage."""
+    crane = load_parameters().crane
+    stiffness = read_spring_stiffness(FOLDER / "calibration.json")
+    if crane.measured.source == "file":
+        table = read_campaign(crane.measured.file)
+        if missing := [f.name for f in MEASURED_FIELDS if f.name not in table]:
+            raise DataError(f"{crane.measured.file}: the tables need the columns {missing} too")
+    else:
+        table = as_built(crane, stiffness)
+    write_table(
+        FOLDER / "measured.parquet",
+        {field.name: table[field.name].to_numpy() for field in MEASURED_FIELDS},
+        MEASURED_FIELDS,
+        measured_checksum(crane, stiffness),
+    )
+    print(f"{len(table)} measurements, {crane.measured.source.replace('_', ' ')}")
+
+
+def as_built(crane: parameters.Crane, stiffness: float) -> pd.DataFrame:
+    """Campaign on the crane as built."""
+    measured = crane.measured
+    nominal = flexible_crane(crane, stiffness)
+    twin = draw_twin(nominal, Magnitudes(**measured.deviations.model_dump()), measured.seed)
+    generator = np.random.default_rng((measured.seed, 1))
+    chosen = crane.methods[measured.method]
+    network, _ = load_network(
+        FOLDER / "networks" / f"{chosen.network}.json",
+        network_checksum(crane, stiffness, chosen.network),
+    )
+    methods = {
+        "none": uncompensated(nominal.geometry),
+        "combined": crane_method(chosen, nominal.geometry, network),
+    }
+    conditions = all_conditions(measured.points, measured.payloads)
+    initial = initial_positions(nominal.geometry, conditions.targets)
+    tables = []
+    for name, method in methods.items():
+        strokes = method(conditions.targets, conditions.payload, initial).strokes
+        tip = as_built_tips(twin, strokes, conditions.payload, generator)
+        tip = tip + measured.noise * generator.standard_normal(tip.shape)
+        columns = {
+            "method": name,
+            "target_x": conditions.targets[:, 0],
+            "target_y": conditions.targets[:, 1],
+            "payload": conditions.payload,
+            **dict(zip(STROKES, strokes.T, strict=True)),
+            "measured_x": tip[:, 0],
+            "measured_y": tip[:, 1],
+        }
+        tables.append(pd.DataFrame(columns))
+    return pd.concat(tables)
+
+
+if __name__ == "__main__":
+    stage.run(main)

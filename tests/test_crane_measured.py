@@ -1,0 +1,176 @@
+"""Stages of the measured crane and what the report says of it."""
+
+import dataclasses
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from flexik.datasets.crane import STROKES
+from flexik.errors import DataError, ParameterError
+from flexik.mechanisms.crane import forward, inverse_with_smallest_extension
+from flexik.multibody.as_built import Magnitudes, as_built_tips, draw_twin
+from flexik.multibody.assembly import flexible_crane
+from flexik.multibody.crane import equilibrium
+from flexik.parameters import load_parameters
+from flexik.positioning.assembly import uncompensated
+from flexik.positioning.method import PositioningError
+from flexik.reporting import measured_report
+
+ROOT = Path(__file__).parents[1]
+SPRING = 8.45e6  # N m/rad
+POINTS = np.array([[2.2, 0.95], [2.2, 0.15], [3.8, 0.95]])
+
+
+def script(name):
+    spec = importlib.util.spec_from_file_location(name, ROOT / "stages" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def crane():
+    return load_parameters(ROOT / "params.yaml").crane
+
+
+@pytest.fixture(scope="module")
+def nominal(crane):
+    return flexible_crane(crane, SPRING)
+
+
+def small(crane, **changes):
+    adaptation = crane.measured.adaptation.model_copy(
+        update={"n_cranes": 1, "n_measurements": [3, 6], "n_targets": 4, **changes}
+    )
+    return crane.measured.model_copy(update={"adaptation": adaptation})
+
+
+class NoDeflection:
+    """Stands for a trained network."""
+
+    def predict(self, values):
+        """Nothing bends."""
+        return np.zeros((len(values), 2))
+
+
+def test_errors_of_a_crane_as_built_are_those_of_its_tips(crane, nominal):
+    stage = script("crane_adaptation")
+    measured = small(crane)
+    study = stage.Study(measured, nominal, NoDeflection(), uncompensated(nominal.geometry))
+    table = stage.errors_of(study, 2)
+    assert table["n_measurements"].tolist() == [0] * 4 + [3] * 4 + [6] * 4
+    assert (table["twin"] == 2).all()
+    pd.testing.assert_frame_equal(table, stage.errors_of(study, 2))
+    assert not np.allclose(table["error"], stage.errors_of(study, 3)["error"])
+
+    # without repeatability the unadapted errors follow from the strokes of the rigid inverse
+    still = measured.model_copy(
+        update={"deviations": measured.deviations.model_copy(update={"repeatability": 0.0})}
+    )
+    study = dataclasses.replace(study, measured=still)
+    table = stage.errors_of(study, 2)[:4]
+    targets = table[["target_x", "target_y"]].to_numpy()
+    strokes = inverse_with_smallest_extension(nominal.geometry, targets).strokes
+    magnitudes = Magnitudes(**still.deviations.model_dump())
+    twin = draw_twin(nominal, magnitudes, still.adaptation.seed + 2)
+    tips = as_built_tips(twin, strokes, table["payload"].to_numpy())
+    expected = np.linalg.norm(tips - targets, axis=1)
+    np.testing.assert_allclose(table["error"], expected, atol=1e-9)
+
+
+def test_an_area_out_of_reach_is_told(crane, nominal):
+    stage = script("crane_adaptation")
+    study = stage.Study(
+        small(crane, x=(6.3, 7.0)), nominal, NoDeflection(), uncompensated(nominal.geometry)
+    )
+    with pytest.raises(ParameterError, match=r"crane\.measured\.adaptation: the crane reaches"):
+        stage.errors_of(study, 0)
+
+
+def test_a_target_that_is_not_reached_is_told(crane, nominal):
+    stage = script("crane_adaptation")
+    study = stage.Study(small(crane), nominal, NoDeflection(), uncompensated(nominal.geometry))
+
+    class Fails:
+        def __call__(self, targets, payload, initial):
+            command = study.compensator(targets, payload, initial)
+            return dataclasses.replace(command, status=command.status + 3)
+
+    conditions = stage.drawn(study, 2, np.random.default_rng(0))
+    twin = draw_twin(nominal, Magnitudes(*[0.0] * 8), 0)
+    with pytest.raises(PositioningError, match="2 targets are not reached, the first is"):
+        stage.approached(Fails(), conditions, study, twin, np.random.default_rng(0))
+
+
+def campaign(nominal, payloads=(0.0, 172.0)):
+    """Reached points 10 mm off without compensation, 2 mm with it, but for the second point."""
+    rows = []
+    strokes = inverse_with_smallest_extension(nominal.geometry, POINTS).strokes
+    for method, error in (("none", 0.010), ("combined", 0.002)):
+        for number, (point, row) in enumerate(zip(POINTS, strokes, strict=True)):
+            for payload in payloads:
+                off = 0.012 if method == "combined" and number == 1 else error
+                rows.append([method, *point, payload, *row, point[0] - off, point[1]])
+    columns = ["method", "target_x", "target_y", "payload", *STROKES, "measured_x", "measured_y"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+@pytest.fixture
+def measured(crane, nominal):
+    table = pd.DataFrame(
+        {"twin": [0, 0, 1, 1], "n_measurements": [0, 9, 0, 9], "error": [0.01, 0.002, 0.03, 0.004]}
+    )
+    return measured_report.Measured(crane.measured, campaign(nominal), table, {})
+
+
+def test_the_jib_cylinder_pushes_where_the_flexible_crane_says_so(measured, nominal):
+    push = measured_report.pushes(measured, nominal)
+    rows = measured.campaign[measured.campaign["method"] == "none"]
+    expected = [
+        equilibrium(nominal, row[list(STROKES)].to_numpy(dtype=float), row["payload"]).forces[
+            "jib_cylinder"
+        ]
+        < 0.0
+        for _, row in rows.iterrows()
+    ]
+    assert push["pushes"].tolist() == expected
+    assert 0 < sum(expected) < len(expected)
+
+
+def test_notes_name_the_points(measured, nominal):
+    (note,) = measured_report.point_notes(measured, nominal)
+    assert "pushes in point 2 (with 172 kg), elsewhere it pulls" in note
+    assert note.endswith("does not help in point 2.")
+
+
+def test_metrics_are_means_over_all(measured):
+    found = measured_report.metrics(measured)
+    assert found["measured.none.mean_error_mm"] == pytest.approx(10.0)
+    assert found["measured.combined.mean_error_mm"] == pytest.approx((2 + 2 + 12) / 3, abs=1e-3)
+    # from the point reached with 0 kg and compensation: 8, 2 and 8 mm without, none with it
+    assert found["measured.reference.none.mean_error_mm"] == pytest.approx(6.0)
+    assert found["measured.reference.combined.mean_error_mm"] == pytest.approx(0.0)
+    assert found["measured.adapted_0.mean_error_mm"] == pytest.approx(20.0)
+    assert found["measured.adapted_9.mean_error_mm"] == pytest.approx(3.0)
+
+
+def test_a_campaign_without_targets_has_no_tables(crane, tmp_path, monkeypatch):
+    stage = script("crane_measured")
+    file = tmp_path / "own.csv"
+    head = "payload_kg,lift_stroke_m,jib_stroke_m,extension_stroke_m,measured_x_m,measured_y_m"
+    strokes = np.array([[0.3, 0.4, 0.5]])
+    x, y = forward(flexible_crane(crane, SPRING).geometry, strokes)[0]
+    file.write_text(f"{head}\n0,0.3,0.4,0.5,{x},{y}\n")
+    own = crane.measured.model_copy(update={"source": "file", "file": str(file)})
+
+    class Given:
+        pass
+
+    Given.crane = crane.model_copy(update={"measured": own})
+    monkeypatch.setattr(stage, "load_parameters", Given)
+    monkeypatch.setattr(stage, "read_spring_stiffness", lambda path: SPRING)
+    with pytest.raises(DataError, match=r"own.csv: the tables need the columns .*'method'"):
+        stage.main()
