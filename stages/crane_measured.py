@@ -20,6 +20,7 @@ from flexik.datasets.tables import write_table
 from flexik.errors import DataError
 from flexik.evaluation.conditions import all_conditions
 from flexik.learning.storage import load_network
+from flexik.mechanisms.crane import CraneGeometry, inverse_with_smallest_extension
 from flexik.multibody.as_built import Magnitudes, as_built_tips, draw_twin
 from flexik.multibody.assembly import flexible_crane, read_spring_stiffness
 from flexik.parameters import load_parameters
@@ -27,6 +28,8 @@ from flexik.positioning.assembly import crane_method, uncompensated
 from flexik.positioning.initial import initial_positions
 
 FOLDER = Path("data/crane")
+# a sensor may say a little beyond the ends of its cylinder, m
+STROKE_TOLERANCE = 0.01
 
 
 def main() -> None:
@@ -34,9 +37,8 @@ def main() -> None:
     crane = load_parameters().crane
     stiffness = read_spring_stiffness(FOLDER / "calibration.json")
     if crane.measured.source == "file":
-        table = read_campaign(crane.measured.file)
-        if missing := [f.name for f in MEASURED_FIELDS if f.name not in table]:
-            raise DataError(f"{crane.measured.file}: the tables need the columns {missing} too")
+        geometry = CraneGeometry(**crane.geometry.model_dump())
+        table = own_campaign(crane.measured.file, geometry)
     else:
         table = as_built(crane, stiffness)
     write_table(
@@ -46,6 +48,30 @@ def main() -> None:
         measured_checksum(crane, stiffness),
     )
     print(f"{len(table)} measurements, {crane.measured.source.replace('_', ' ')}")
+
+
+def own_campaign(file: str, geometry: CraneGeometry) -> pd.DataFrame:
+    """Campaign in `file`; strokes that it leaves out are those of the rigid crane.
+
+    Raises DataError if it lacks the targets or a stroke is beyond its cylinder.
+    """
+    table = read_campaign(file)
+    if missing := [name for name in ("method", "target_x", "target_y") if name not in table]:
+        raise DataError(f"{file}: the tables of errors need {', '.join(missing)} too")
+    if STROKES[0] not in table:
+        targets = table[["target_x", "target_y"]].to_numpy()
+        solution = inverse_with_smallest_extension(geometry, targets)
+        if not solution.reached.all():
+            x, y = targets[~solution.reached][0]
+            raise DataError(f"{file}: the rigid crane does not reach the target ({x:g}, {y:g}) m")
+        table = table.assign(**dict(zip(STROKES, solution.strokes.T, strict=True)))
+    for name, longest in zip(STROKES, geometry.stroke_maximum, strict=True):
+        beyond = ~table[name].between(-STROKE_TOLERANCE, longest + STROKE_TOLERANCE)
+        if beyond.any():
+            raise DataError(
+                f"{file}: {name} {table.loc[beyond, name].iloc[0]:g} m, expected 0 to {longest:g} m"
+            )
+    return table
 
 
 def as_built(crane: parameters.Crane, stiffness: float) -> pd.DataFrame:

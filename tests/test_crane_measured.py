@@ -157,20 +157,37 @@ def test_metrics_are_means_over_all(measured):
     assert found["measured.adapted_9.mean_error_mm"] == pytest.approx(3.0)
 
 
-def test_a_campaign_without_targets_has_no_tables(crane, tmp_path, monkeypatch):
-    stage = script("crane_measured")
+HEAD = "method,target_x_m,target_y_m,payload_kg,measured_x_m,measured_y_m"
+ROWS = [
+    f"{method},3.8,0.95,{load},3.79,0.94" for method in ("none", "combined") for load in (0, 86)
+]
+
+
+def own(tmp_path, head=HEAD, rows=ROWS):
     file = tmp_path / "own.csv"
-    head = "payload_kg,lift_stroke_m,jib_stroke_m,extension_stroke_m,measured_x_m,measured_y_m"
-    strokes = np.array([[0.3, 0.4, 0.5]])
-    x, y = forward(flexible_crane(crane, SPRING).geometry, strokes)[0]
-    file.write_text(f"{head}\n0,0.3,0.4,0.5,{x},{y}\n")
-    own = crane.measured.model_copy(update={"source": "file", "file": str(file)})
+    file.write_text("\n".join([head, *rows]) + "\n")
+    return file
 
-    class Given:
-        pass
 
-    Given.crane = crane.model_copy(update={"measured": own})
-    monkeypatch.setattr(stage, "load_parameters", Given)
-    monkeypatch.setattr(stage, "read_spring_stiffness", lambda path: SPRING)
-    with pytest.raises(DataError, match=r"own.csv: the tables need the columns .*'method'"):
-        stage.main()
+def test_strokes_of_an_own_campaign_may_be_left_out(nominal, tmp_path):
+    stage = script("crane_measured")
+    table = stage.own_campaign(str(own(tmp_path)), nominal.geometry)
+    tip = forward(nominal.geometry, table[list(STROKES)].to_numpy())
+    np.testing.assert_allclose(tip, [[3.8, 0.95]] * 4, atol=1e-9)
+
+
+def test_an_own_campaign_that_cannot_be_is_told(nominal, tmp_path):
+    stage = script("crane_measured")
+    strokes = ",lift_stroke_m,jib_stroke_m,extension_stroke_m"
+    rows = [f"{row},0.3,0.4,-0.5" for row in ROWS]
+    file = own(tmp_path, HEAD + strokes, rows)
+    with pytest.raises(DataError, match=r"own.csv: extension_stroke -0.5 m, expected 0 to 1.6 m"):
+        stage.own_campaign(str(file), nominal.geometry)
+    file = own(tmp_path, rows=[row.replace("3.8,0.95", "8.2,0.95") for row in ROWS])
+    file.write_text(file.read_text().replace("3.79", "8.19"))
+    with pytest.raises(DataError, match=r"own.csv: the rigid crane does not reach .*\(8.2, 0.95\)"):
+        stage.own_campaign(str(file), nominal.geometry)
+    head = "payload_kg,measured_x_m,measured_y_m" + strokes
+    file = own(tmp_path, head, ["0,3.79,0.94,0.3,0.4,0.5"])
+    with pytest.raises(DataError, match=r"own.csv: the tables of errors need method, target_x"):
+        stage.own_campaign(str(file), nominal.geometry)

@@ -43,6 +43,10 @@ class Squares(Sequence[int]):
         return index**2
 
 
+# one process: two clusters at a time are in each other's way
+pytestmark = pytest.mark.xdist_group("dask")
+
+
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[str]:
     import dask  # here, because every worker process imports this module

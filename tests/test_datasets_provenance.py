@@ -9,6 +9,7 @@ from flexik.datasets.provenance import (
     evaluation_checksum,
     fitting_checksum,
     grid_checksum,
+    measured_checksum,
     network_checksum,
     selection_checksum,
     targets_checksum,
@@ -23,7 +24,7 @@ SPRING = 8e6  # N m/rad
 
 # Keys of params.yaml changed one at a time, and the checksums each must change
 GRID, SELECTION, TARGETS = "grid", "selection", "targets"
-FITTING, TOLERANCES, NONE = "fitting", "tolerances", "none"
+FITTING, TOLERANCES, MEASURED, NONE = "fitting", "tolerances", "measured", "none"
 FIXED = {f"network {name}" for name in ("deflection", "direct", "rigid", "inverse", "modular")}
 CHOSEN = {f"{name}_selected" for name in FIXED}
 
@@ -51,7 +52,8 @@ def users(trainer):
 
 def judged(*labels):
     """What two checksums stand for: the test conditions and the workspace."""
-    return {f"{place} {label}" for place in ("evaluation", "workspace") for label in labels}
+    found = {f"{place} {label}" for place in ("evaluation", "workspace") for label in labels}
+    return found | {MEASURED} if {"combined", "combined_selected"} & set(labels) else found
 
 
 def trained(*names):
@@ -64,9 +66,9 @@ def trained(*names):
 NETWORKS = FIXED | CHOSEN
 METHODS = judged(*BUILT_FROM)
 EVALUATIONS = {name for name in METHODS | judged(NONE) if name.startswith("evaluation ")}
-WORKSPACES = (METHODS | judged(NONE)) - EVALUATIONS
+WORKSPACES = (METHODS | judged(NONE)) - EVALUATIONS - {MEASURED}
 STUDIES = {FITTING, TOLERANCES}
-EVERYTHING = {GRID, SELECTION, TARGETS} | NETWORKS | EVALUATIONS | WORKSPACES | STUDIES
+EVERYTHING = {GRID, SELECTION, TARGETS, MEASURED} | NETWORKS | EVALUATIONS | WORKSPACES | STUDIES
 COVERED = {
     "geometry.rocker_length": EVERYTHING,
     "structure.gravity": EVERYTHING,
@@ -98,6 +100,8 @@ COVERED = {
     "methods.direct.inversion.learning_rate": judged("direct") | {TOLERANCES},
     "methods.modular_gauss_newton.inversion.damping": judged("modular_gauss_newton"),
     "tolerance_study.tolerances.1": {TOLERANCES},
+    "measured.seed": {MEASURED},
+    "measured.adaptation.n_targets": {MEASURED},
     "calibration.stiffness_range.0": set(),
     "mesh_study.seed": set(),
     "illustration.payload": set(),
@@ -113,6 +117,7 @@ def checksums(data, spring=SPRING):
         TARGETS: targets_checksum(crane, spring),
         FITTING: fitting_checksum(crane, spring),
         TOLERANCES: tolerance_checksum(crane, spring),
+        MEASURED: measured_checksum(crane, spring),
         **{f"network {name}": network_checksum(crane, spring, name) for name in crane.all_networks},
         **{
             f"{place} {label}": made_with(crane, spring, label)

@@ -124,7 +124,8 @@ def write(measured: Measured, crane: FlexibleCrane, folder: Path) -> None:
     settings = measured.parameters.adaptation
     caption = (
         f"Errors at {settings.n_targets} other targets on each of {settings.n_cranes} cranes as "
-        "built, after N measurements; N = 0: the compensator of the nominal crane."
+        "built, after N measurements; N = 0: the compensator of the nominal crane. The percentile "
+        "is that of each crane, averaged."
     )
     table = campaign_tables.adaptation_table(statistics)
     tables.write_table(folder / "adaptation", table, 2, caption)
@@ -142,7 +143,8 @@ def _write_figures(
     points = unloaded[["target_x", "target_y"]].to_numpy()
     strokes = unloaded[list(STROKES)].to_numpy()
     by_point = pushes(measured, crane).groupby(["target_x", "target_y"], sort=False)["pushes"]
-    jib_pushes = by_point.any().to_numpy()
+    pushing = by_point.any().to_dict()
+    jib_pushes = [pushing[tuple(point)] for point in points]
     path = folder / "measured_points.png"
     campaign_figures.measured_points(path, crane.geometry, strokes, points, jib_pushes)
     for axis in ("x", "y"):
@@ -159,6 +161,12 @@ def _write_figures(
         if n in measured.parameters.adaptation.n_measurements
     }
     campaign_figures.adaptation(folder / "adaptation.png", statistics, goals)
+
+
+def target_points(measured: Measured) -> np.ndarray:
+    """Targets (k, 2) of the campaign, m, in their order."""
+    keys = ["target_x", "target_y"]
+    return measured.campaign[keys].drop_duplicates().to_numpy()
 
 
 def named_points(points: np.ndarray) -> np.ndarray:
@@ -182,12 +190,13 @@ def section(measured: Measured, folder: Path) -> page.Section:
     )
     return page.Section(
         "Measured crane",
-        f"{source} Points 2 and 3 have the jib arm on the other side of the vertical.\n\n"
-        "Adaptation: from N measured points the most probable offsets of pins, lengths, strokes, "
-        "play and stiffness of the nominal crane are identified, and the compensator uses them. "
-        "What it expects before measuring are the sizes that the cranes were drawn with "
-        "(`expected` and `deviations` in params.yaml). Errors include the repeatability of the "
-        "strokes.",
+        f"{source}\n\n"
+        "Adaptation, on cranes as built in the model whatever the source of the campaign: from N "
+        "measured points the most probable offsets of pins, lengths, strokes, play and stiffness "
+        "of the nominal crane are identified, and the compensator uses them. The cranes differ "
+        "from the nominal one only in such offsets, so a real crane will leave more. Before "
+        "measuring it expects `expected`, the cranes are drawn with `deviations` (params.yaml). "
+        "Errors include the repeatability of the strokes.",
         [
             folder / "measured_errors.md",
             folder / "measured_reference_errors.md",
@@ -205,8 +214,10 @@ def section(measured: Measured, folder: Path) -> page.Section:
                 figures / "measured_reference_errors_y.png",
                 "Errors in y from the reference point (after figure 4.23).",
             ),
-            (figures / "measured_point_1.png", "Points reached (after figure 4.24)."),
-            (figures / "measured_point_2.png", "Points reached (after figure 4.25)."),
+            *(
+                (figures / f"measured_point_{number}.png", "Points reached about one target.")
+                for number in range(1, 1 + len(named_points(target_points(measured))))
+            ),
             (figures / "adaptation.png", "Error by number of measurements."),
         ],
     )
