@@ -13,6 +13,7 @@ from flexik.parameters.model import (
     Seed,
     Share,
     Vector,
+    check_increase,
 )
 
 
@@ -51,8 +52,7 @@ class Selection(Model):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        if not self.payload[0] < self.payload[1]:
-            raise ValueError("payload: must increase")
+        check_increase(self, "payload")
         return self
 
 
@@ -76,8 +76,5 @@ class Workspace(Model):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        for name in ("x", "y", "payload"):
-            low, high = getattr(self, name)
-            if not low < high:
-                raise ValueError(f"{name}: must increase")
+        check_increase(self, "x", "y", "payload")
         return self

@@ -13,6 +13,7 @@ from flexik.parameters.model import (
     Positive,
     Seed,
     Vector,
+    check_increase,
 )
 
 
@@ -59,10 +60,7 @@ class Adaptation(Model):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        for name in ("x", "y", "payload"):
-            low, high = getattr(self, name)
-            if not low < high:
-                raise ValueError(f"{name}: must increase")
+        check_increase(self, "x", "y", "payload")
         if self.n_measurements != sorted(set(self.n_measurements)):
             raise ValueError("n_measurements: must increase")
         return self

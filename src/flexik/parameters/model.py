@@ -36,6 +36,14 @@ class Model(BaseModel):
         return data
 
 
+def check_increase(section: Model, *names: str) -> None:
+    """Raise ValueError unless each of the intervals `names` of `section` increases."""
+    for name in names:
+        low, high = getattr(section, name)
+        if not low < high:
+            raise ValueError(f"{name}: must increase")
+
+
 def _entries(value: Any) -> Iterator[Any]:
     """`value`, or the entries of lists however deep."""
     if isinstance(value, list):

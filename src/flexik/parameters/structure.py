@@ -4,7 +4,16 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flexik.parameters.model import Count, Interval, Model, NotNegative, Positive, Seed, Vector
+from flexik.parameters.model import (
+    Count,
+    Interval,
+    Model,
+    NotNegative,
+    Positive,
+    Seed,
+    Vector,
+    check_increase,
+)
 
 
 class Geometry(Model):
@@ -81,8 +90,7 @@ class Calibration(Model):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        if not self.stiffness_range[0] < self.stiffness_range[1]:
-            raise ValueError("stiffness_range: must increase")
+        check_increase(self, "stiffness_range")
         return self
 
 

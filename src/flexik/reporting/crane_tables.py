@@ -138,12 +138,12 @@ def _write_without_worst(results: Results, folder: Path) -> None:
 
 def _write_inversions(results: Results, folder: Path) -> None:
     """What the way of inverting a network changes."""
-    times = results.query_times.set_index("method")
+    times, statistics = results.query_times.set_index("method"), results.statistics
     rows = []
     for label, method in results.crane.methods.items():
         if not isinstance(method, InvertedModel):
             continue
-        found, frame = results.statistics[label], results.errors[label]
+        found, frame = statistics[label], results.errors[label]
         rows.append(
             {
                 "method": label,
@@ -245,7 +245,7 @@ def _write_query_cost(results: Results, folder: Path) -> None:
 
 def query_cost(results: Results) -> pd.DataFrame:
     """A row for every method of params.yaml."""
-    times = results.query_times.set_index("method")
+    times, statistics = results.query_times.set_index("method"), results.statistics
     rows = []
     for label, method in results.crane.methods.items():
         published = results.published.operations.get(method.method)
@@ -256,7 +256,7 @@ def query_cost(results: Results) -> pd.DataFrame:
                 "published": float(published) if label == method.method and published else None,
                 "single (us)": _time(times, label, "microseconds_single"),
                 "batched (us)": _time(times, label, "microseconds_batched"),
-                "mean R (mm)": MM * results.statistics[label]["mean_error"],
+                "mean R (mm)": MM * statistics[label]["mean_error"],
             }
         )
     return pd.DataFrame(rows)
