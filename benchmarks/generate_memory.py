@@ -15,7 +15,7 @@ from pathlib import Path
 
 import table_grid
 
-from flexik.datasets.crane import GridParts, counts
+from flexik.datasets.crane.grid import GridParts, counts
 
 # Values on the axes: 4050 vectors as in table 4.1, ten times and 100 times as many
 SMALL = {"lift": 9, "jib": 9, "extension": 5, "payload": 10}

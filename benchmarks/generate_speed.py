@@ -12,10 +12,10 @@ from exudyn.processing import ParameterVariation
 from joblib.externals.loky import get_reusable_executor
 from numpy.typing import NDArray
 
-from flexik.datasets.crane import INPUTS, KEPT, GridParts
+from flexik.datasets.crane.grid import INPUTS, KEPT, GridParts
 from flexik.errors import FlexikError, SolverError
 from flexik.mechanisms.crane import forward
-from flexik.multibody.crane import CraneModel
+from flexik.multibody.crane.model import CraneModel
 
 Array = NDArray[np.float64]
 

@@ -23,17 +23,17 @@ from threadpoolctl import threadpool_limits
 from training_race import pinned_pool
 
 from flexik import parameters, stage
-from flexik.datasets.evaluations import TARGET_FIELDS
-from flexik.datasets.provenance import network_checksum, query_checksum, targets_checksum
+from flexik.datasets.crane.evaluations import TARGET_FIELDS
+from flexik.datasets.crane.provenance import network_checksum, query_checksum, targets_checksum
 from flexik.datasets.tables import read_table
 from flexik.errors import DataError
 from flexik.evaluation.conditions import Conditions, all_conditions, random_conditions
 from flexik.learning.storage import load_network
 from flexik.mechanisms.crane import CraneGeometry
-from flexik.multibody.assembly import read_spring_stiffness
+from flexik.multibody.crane.assembly import read_spring_stiffness
 from flexik.parameters import load_parameters
-from flexik.positioning.assembly import crane_method, uncompensated
-from flexik.positioning.initial import initial_positions
+from flexik.positioning.crane.assembly import crane_method, uncompensated
+from flexik.positioning.crane.initial import initial_positions
 from flexik.positioning.method import Method
 from flexik.reporting.tables import markdown, write_table
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from flexik.datasets.crane import FIELDS, GridParts, axis, generate
+from flexik.datasets.crane.grid import FIELDS, GridParts, axis, generate
 from flexik.datasets.parallel import ParallelSettings
 from flexik.datasets.tables import read_table
 from flexik.files import read_json
-from flexik.multibody.assembly import flexible_crane
-from flexik.multibody.crane import FlexibleCrane
+from flexik.multibody.crane.assembly import flexible_crane
+from flexik.multibody.crane.model import FlexibleCrane
 from flexik.parameters import Crane, load_parameters
 
 CALIBRATION = Path("data/crane/calibration.json")

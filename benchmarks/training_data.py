@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.datasets.crane import FIELDS, INPUTS, deflection, kept
-from flexik.datasets.provenance import grid_checksum, selection_checksum
+from flexik.datasets.crane.grid import FIELDS, INPUTS, deflection, kept
+from flexik.datasets.crane.provenance import grid_checksum, selection_checksum
 from flexik.datasets.tables import read_table
 from flexik.files import read_json
 from flexik.learning.perceptron import Network, Normalisation, Quantity

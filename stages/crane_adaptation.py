@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 
 from flexik import parameters, stage
-from flexik.datasets.evaluations import ADAPTATION_FIELDS
+from flexik.datasets.crane.provenance import measured_checksum, network_checksum
+from flexik.datasets.crane_measured.fields import ADAPTATION_FIELDS
 from flexik.datasets.parallel import ParallelSettings, from_environment, parallel_map
-from flexik.datasets.provenance import measured_checksum, network_checksum
 from flexik.datasets.tables import write_table
 from flexik.errors import ParameterError
 from flexik.evaluation.conditions import Conditions, random_conditions
@@ -24,13 +24,23 @@ from flexik.evaluation.targets import draw_candidates
 from flexik.learning.perceptron import Network
 from flexik.learning.storage import load_network
 from flexik.mechanisms.crane import smallest_extension
-from flexik.multibody.as_built import AsBuiltCrane, Magnitudes, as_built_tips, draw_twin
-from flexik.multibody.assembly import flexible_crane, read_spring_stiffness
-from flexik.multibody.structure import FlexibleCrane
+from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
+from flexik.multibody.crane.structure import FlexibleCrane
+from flexik.multibody.crane_measured.as_built import (
+    AsBuiltCrane,
+    Magnitudes,
+    as_built_tips,
+    draw_twin,
+)
 from flexik.parameters import load_parameters
-from flexik.positioning.adapted import AdaptationSettings, Adapted, Measurements, identify
-from flexik.positioning.assembly import crane_method
-from flexik.positioning.initial import initial_positions
+from flexik.positioning.crane.assembly import crane_method
+from flexik.positioning.crane.initial import initial_positions
+from flexik.positioning.crane_measured.adapted import (
+    AdaptationSettings,
+    Adapted,
+    Measurements,
+    identify,
+)
 from flexik.positioning.method import REACHED, Array, Method, PositioningError
 
 FOLDER = Path("data/crane")

@@ -13,16 +13,16 @@ import pandas as pd
 from flexik import stage
 from flexik.datasets.tables import read_csv
 from flexik.errors import DataError
-from flexik.evaluation.calibration import fit_spring
 from flexik.evaluation.conditions import all_conditions
+from flexik.evaluation.crane.calibration import fit_spring
 from flexik.evaluation.errors import evaluate, statistics
 from flexik.files import write_json
-from flexik.multibody.assembly import flexible_crane
-from flexik.multibody.crane import tips
+from flexik.multibody.crane.assembly import flexible_crane
+from flexik.multibody.crane.model import tips
 from flexik.parameters import load_parameters
-from flexik.positioning.initial import initial_positions
+from flexik.positioning.crane.closed_form import closed_form
+from flexik.positioning.crane.initial import initial_positions
 from flexik.positioning.none import Uncompensated
-from flexik.positioning.rigid_inverse import closed_form
 
 PUBLISHED = Path("data/reference/crane/positioning_errors.csv")
 OUTPUT = Path("data/crane/calibration.json")

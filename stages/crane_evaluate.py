@@ -11,25 +11,25 @@ import functools
 from pathlib import Path
 
 from flexik import parameters, stage
-from flexik.datasets.crane import parallel_tips
-from flexik.datasets.evaluations import TARGET_FIELDS, write_evaluation
-from flexik.datasets.parallel import ParallelSettings, from_environment
-from flexik.datasets.provenance import (
+from flexik.datasets.crane.evaluations import TARGET_FIELDS, write_evaluation
+from flexik.datasets.crane.grid import parallel_tips
+from flexik.datasets.crane.provenance import (
     evaluation_checksum,
     network_checksum,
     targets_checksum,
     workspace_checksum,
 )
+from flexik.datasets.parallel import ParallelSettings, from_environment
 from flexik.datasets.tables import read_table
 from flexik.errors import ParameterError
 from flexik.evaluation.conditions import Conditions, all_conditions, random_conditions
 from flexik.evaluation.errors import evaluate, statistics
 from flexik.learning.storage import load_network
 from flexik.mechanisms.crane import CraneGeometry
-from flexik.multibody.assembly import flexible_crane, read_spring_stiffness
+from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
 from flexik.parameters import load_parameters
-from flexik.positioning.assembly import crane_method, uncompensated
-from flexik.positioning.initial import initial_positions
+from flexik.positioning.crane.assembly import crane_method, uncompensated
+from flexik.positioning.crane.initial import initial_positions
 from flexik.positioning.method import Method
 
 FOLDER = Path("data/crane")

@@ -13,16 +13,16 @@ import numpy as np
 import pandas as pd
 
 from flexik import parameters, stage
-from flexik.datasets.crane import FIELDS, INPUTS, deflection, kept
-from flexik.datasets.crane_learning import FITTING_FIELDS, KINDS, on_line
-from flexik.datasets.provenance import fitting_checksum, grid_checksum
+from flexik.datasets.crane.grid import FIELDS, INPUTS, deflection, kept
+from flexik.datasets.crane.learning import FITTING_FIELDS, KINDS, on_line
+from flexik.datasets.crane.provenance import fitting_checksum, grid_checksum
 from flexik.datasets.tables import read_table, write_table
 from flexik.errors import ParameterError, TrainingError
 from flexik.learning.perceptron import Network, quantities
 from flexik.learning.training import Architecture, train, trainer_settings
 from flexik.mechanisms.crane import forward
-from flexik.multibody.assembly import flexible_crane, read_spring_stiffness
-from flexik.multibody.crane import tips
+from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
+from flexik.multibody.crane.model import tips
 from flexik.parameters import load_parameters
 
 FOLDER = Path("data/crane")

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from flexik import datasets, mechanisms, multibody, stage
-from flexik.datasets.crane import (
+from flexik.datasets.crane.grid import (
     FIELDS,
     GridParts,
     axis,
@@ -20,12 +20,12 @@ from flexik.datasets.crane import (
     random_samples,
     split,
 )
+from flexik.datasets.crane.provenance import grid_checksum, selection_checksum
 from flexik.datasets.parallel import ParallelSettings, from_environment
-from flexik.datasets.provenance import grid_checksum, selection_checksum
 from flexik.datasets.tables import read_table
 from flexik.errors import SolverError
 from flexik.files import checksum, source_checksum
-from flexik.multibody.assembly import flexible_crane, read_spring_stiffness
+from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
 from flexik.parameters import load_parameters
 
 FOLDER = Path("data/crane")

@@ -12,20 +12,20 @@ import numpy as np
 import pandas as pd
 
 from flexik import parameters, stage
-from flexik.datasets.campaign import read_campaign
-from flexik.datasets.crane import STROKES
-from flexik.datasets.evaluations import MEASURED_FIELDS
-from flexik.datasets.provenance import measured_checksum, network_checksum
+from flexik.datasets.crane.grid import STROKES
+from flexik.datasets.crane.provenance import measured_checksum, network_checksum
+from flexik.datasets.crane_measured.campaign import read_campaign
+from flexik.datasets.crane_measured.fields import MEASURED_FIELDS
 from flexik.datasets.tables import write_table
 from flexik.errors import DataError
 from flexik.evaluation.conditions import all_conditions
 from flexik.learning.storage import load_network
 from flexik.mechanisms.crane import CraneGeometry, inverse_with_smallest_extension
-from flexik.multibody.as_built import Magnitudes, as_built_tips, draw_twin
-from flexik.multibody.assembly import flexible_crane, read_spring_stiffness
+from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
+from flexik.multibody.crane_measured.as_built import Magnitudes, as_built_tips, draw_twin
 from flexik.parameters import load_parameters
-from flexik.positioning.assembly import crane_method, uncompensated
-from flexik.positioning.initial import initial_positions
+from flexik.positioning.crane.assembly import crane_method, uncompensated
+from flexik.positioning.crane.initial import initial_positions
 
 FOLDER = Path("data/crane")
 # a sensor may say a little beyond the ends of its cylinder, m

@@ -7,10 +7,10 @@ crane.selection.payload; data/crane/calibration.json. Writes data/crane/mesh_stu
 from pathlib import Path
 
 from flexik import stage
-from flexik.datasets.crane import random_samples
+from flexik.datasets.crane.grid import random_samples
 from flexik.files import write_text
-from flexik.multibody.assembly import flexible_crane, read_spring_stiffness
-from flexik.multibody.mesh_study import mesh_study
+from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
+from flexik.multibody.crane.mesh_study import mesh_study
 from flexik.parameters import load_parameters
 
 OUTPUT = Path("data/crane/mesh_study.csv")

@@ -14,15 +14,10 @@ from pathlib import Path
 import pandas as pd
 
 from flexik import parameters, stage
-from flexik.datasets.crane import FIELDS
-from flexik.datasets.crane_learning import FITTING_FIELDS
-from flexik.datasets.evaluations import (
-    ADAPTATION_FIELDS,
-    MEASURED_FIELDS,
-    TOLERANCE_FIELDS,
-    read_evaluation,
-)
-from flexik.datasets.provenance import (
+from flexik.datasets.crane.evaluations import TOLERANCE_FIELDS, read_evaluation
+from flexik.datasets.crane.grid import FIELDS
+from flexik.datasets.crane.learning import FITTING_FIELDS
+from flexik.datasets.crane.provenance import (
     evaluation_checksum,
     fitting_checksum,
     grid_checksum,
@@ -33,18 +28,19 @@ from flexik.datasets.provenance import (
     tolerance_checksum,
     workspace_checksum,
 )
+from flexik.datasets.crane_measured.fields import ADAPTATION_FIELDS, MEASURED_FIELDS
 from flexik.datasets.tables import read_csv, read_table
 from flexik.errors import DataError
 from flexik.files import read_json
 from flexik.learning.size_selection import FIELDS as STUDY_FIELDS
 from flexik.learning.size_selection import by_size, read_choice
 from flexik.learning.storage import load_network
-from flexik.multibody.assembly import read_spring_stiffness
+from flexik.multibody.crane.assembly import read_spring_stiffness
 from flexik.parameters import load_parameters
-from flexik.reporting.campaign_tables import PUBLISHED_COLUMNS
-from flexik.reporting.crane_report import write_report
-from flexik.reporting.crane_results import Published, Results
-from flexik.reporting.measured_report import Measured
+from flexik.reporting.crane.report import write_report
+from flexik.reporting.crane.results import Published, Results
+from flexik.reporting.crane_measured.campaign_tables import PUBLISHED_COLUMNS
+from flexik.reporting.crane_measured.report import Measured
 
 DATA, REPORTS = Path("data/crane"), Path("reports/crane")
 BENCHMARKS, REFERENCE = Path("reports/benchmarks"), Path("data/reference/crane")

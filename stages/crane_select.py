@@ -12,10 +12,10 @@ n_hidden. Killed and run again it goes on where it was.
 from pathlib import Path
 
 from flexik import datasets, learning, parameters, stage
-from flexik.datasets.crane import axis
-from flexik.datasets.crane_learning import KINDS, read_learning_data
+from flexik.datasets.crane.grid import axis
+from flexik.datasets.crane.learning import KINDS, read_learning_data
+from flexik.datasets.crane.provenance import network_checksum
 from flexik.datasets.parallel import ParallelSettings, from_environment
-from flexik.datasets.provenance import network_checksum
 from flexik.datasets.tables import read_table
 from flexik.errors import ParameterError
 from flexik.files import checksum, source_checksum, write_json
@@ -23,7 +23,7 @@ from flexik.learning.perceptron import quantities
 from flexik.learning.size_selection import FIELDS, Study, by_size, choose, run_study
 from flexik.learning.storage import load_network
 from flexik.learning.training import Architecture, trainer_settings
-from flexik.multibody.assembly import read_spring_stiffness
+from flexik.multibody.crane.assembly import read_spring_stiffness
 from flexik.parameters import load_parameters
 
 DATA = Path("data/crane")

@@ -12,18 +12,18 @@ from typing import NamedTuple
 import numpy as np
 
 from flexik import parameters, stage
-from flexik.datasets.evaluations import TARGET_FIELDS
+from flexik.datasets.crane.evaluations import TARGET_FIELDS
+from flexik.datasets.crane.provenance import targets_checksum
 from flexik.datasets.parallel import ParallelSettings, from_environment, parallel_map
-from flexik.datasets.provenance import targets_checksum
 from flexik.datasets.tables import write_table
 from flexik.errors import ParameterError
 from flexik.evaluation.targets import Targets, draw_candidates, reachable_targets
 from flexik.mechanisms.crane import forward
-from flexik.multibody.assembly import flexible_crane, read_spring_stiffness
-from flexik.multibody.crane import FlexibleCrane, solve
+from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
+from flexik.multibody.crane.model import FlexibleCrane, solve
 from flexik.parameters import load_parameters
+from flexik.positioning.crane.closed_form import closed_form
 from flexik.positioning.method import Array
-from flexik.positioning.rigid_inverse import closed_form
 
 FOLDER = Path("data/crane")
 ROWS_PER_PART = 400

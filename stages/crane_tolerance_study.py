@@ -12,18 +12,18 @@ from pathlib import Path
 import pandas as pd
 
 from flexik import parameters, stage
-from flexik.datasets.evaluations import TOLERANCE_FIELDS
-from flexik.datasets.provenance import network_checksum, tolerance_checksum
+from flexik.datasets.crane.evaluations import TOLERANCE_FIELDS
+from flexik.datasets.crane.provenance import network_checksum, tolerance_checksum
 from flexik.datasets.tables import write_table
 from flexik.evaluation.conditions import all_conditions
 from flexik.evaluation.tolerance import tolerance_study
 from flexik.learning.storage import load_network
 from flexik.mechanisms.crane import CraneGeometry
-from flexik.multibody.assembly import flexible_crane, read_spring_stiffness
-from flexik.multibody.crane import tips
+from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
+from flexik.multibody.crane.model import tips
 from flexik.parameters import load_parameters
-from flexik.positioning.assembly import crane_method
-from flexik.positioning.initial import initial_positions
+from flexik.positioning.crane.assembly import crane_method
+from flexik.positioning.crane.initial import initial_positions
 from flexik.positioning.method import Method, Network
 
 FOLDER = Path("data/crane")

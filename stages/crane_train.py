@@ -17,9 +17,9 @@ import numpy as np
 import pandas as pd
 
 from flexik import parameters, stage
-from flexik.datasets.crane_learning import KINDS, read_learning_data
+from flexik.datasets.crane.learning import KINDS, read_learning_data
+from flexik.datasets.crane.provenance import network_checksum
 from flexik.datasets.parallel import ParallelSettings, from_environment, parallel_map
-from flexik.datasets.provenance import network_checksum
 from flexik.errors import ParameterError, TrainingError
 from flexik.files import write_text
 from flexik.learning.modular import combine
@@ -27,7 +27,7 @@ from flexik.learning.perceptron import Network, quantities
 from flexik.learning.size_selection import read_choice
 from flexik.learning.storage import load_network, save_network
 from flexik.learning.training import Architecture, TrainingRecord, train_best, trainer_settings
-from flexik.multibody.assembly import read_spring_stiffness
+from flexik.multibody.crane.assembly import read_spring_stiffness
 from flexik.parameters import load_parameters
 
 DATA = Path("data/crane")

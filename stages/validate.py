@@ -13,7 +13,7 @@ from flexik import parameters, stage
 from flexik.errors import DataError, FlexikError, ParameterError
 from flexik.files import write_text
 from flexik.mechanisms.crane import CraneGeometry, check_assembly, smallest_extension
-from flexik.multibody.assembly import flexible_crane
+from flexik.multibody.crane.assembly import flexible_crane
 from flexik.parameters import load_parameters
 
 OUTPUT = Path("data/validated.txt")

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from flexik.errors import ParameterError
-from flexik.evaluation.calibration import fit_spring
+from flexik.evaluation.crane.calibration import fit_spring
 
 BEAMS_ERROR, SPRING_ERROR = 0.004, 2e5  # m, and m per 1/(N m/rad): error = a + b / k
 

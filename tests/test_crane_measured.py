@@ -8,16 +8,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from flexik.datasets.crane import STROKES
+from flexik.datasets.crane.grid import STROKES
 from flexik.errors import DataError, ParameterError
 from flexik.mechanisms.crane import forward, inverse_with_smallest_extension
-from flexik.multibody.as_built import Magnitudes, as_built_tips, draw_twin
-from flexik.multibody.assembly import flexible_crane
-from flexik.multibody.crane import equilibrium
+from flexik.multibody.crane.assembly import flexible_crane
+from flexik.multibody.crane.model import equilibrium
+from flexik.multibody.crane_measured.as_built import Magnitudes, as_built_tips, draw_twin
 from flexik.parameters import load_parameters
-from flexik.positioning.assembly import uncompensated
+from flexik.positioning.crane.assembly import uncompensated
 from flexik.positioning.method import PositioningError
-from flexik.reporting import measured_report
+from flexik.reporting.crane_measured import report as measured_report
 
 ROOT = Path(__file__).parents[1]
 SPRING = 8.45e6  # N m/rad

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 import yaml
 
-from flexik.datasets.evaluations import TARGET_FIELDS
-from flexik.datasets.provenance import targets_checksum
+from flexik.datasets.crane.evaluations import TARGET_FIELDS
+from flexik.datasets.crane.provenance import targets_checksum
 from flexik.datasets.tables import read_table
-from flexik.multibody.assembly import flexible_crane
-from flexik.multibody.crane import tips
+from flexik.multibody.crane.assembly import flexible_crane
+from flexik.multibody.crane.model import tips
 from flexik.parameters import load_parameters
 
 ROOT = Path(__file__).resolve().parents[1]

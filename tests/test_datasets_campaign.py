@@ -5,9 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexik.datasets.campaign import COLUMNS, read_campaign
+from flexik.datasets.crane_measured.campaign import COLUMNS, read_campaign
 from flexik.errors import DataError
-from flexik.evaluation.campaign import campaign_table, reference_errors, split_campaign
+from flexik.evaluation.crane_measured.campaign import (
+    campaign_table,
+    reference_errors,
+    split_campaign,
+)
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "data/reference/crane/campaign_example.csv"
 GOOD = """\

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flexik.datasets.crane import (
+from flexik.datasets.crane.grid import (
     FAILED,
     FIELDS,
     INPUTS,
@@ -33,8 +33,8 @@ from flexik.datasets.parallel import ParallelSettings
 from flexik.datasets.tables import read_table
 from flexik.errors import ParameterError, SolverError
 from flexik.mechanisms.crane import forward
-from flexik.multibody.assembly import flexible_crane
-from flexik.multibody.crane import tips
+from flexik.multibody.crane.assembly import flexible_crane
+from flexik.multibody.crane.model import tips
 from flexik.parameters import load_parameters
 
 ROOT = Path(__file__).parents[1]
@@ -224,7 +224,7 @@ def commanded(geometry):
 
 @pytest.mark.parametrize("n_workers", [1, 2])
 def test_parallel_tips_are_the_tips_in_their_order(crane, commanded, n_workers, monkeypatch):
-    monkeypatch.setattr("flexik.datasets.crane.split", functools.partial(split, n_rows=3))
+    monkeypatch.setattr("flexik.datasets.crane.grid.split", functools.partial(split, n_rows=3))
     strokes, payload = commanded
     found = parallel_tips(crane, strokes, payload, ParallelSettings(n_workers))
     alone = [tips(crane, strokes[[i]], payload[[i]])[0] for i in range(len(payload))]

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from flexik.datasets.crane import FAILED, FIELDS, KEPT, LEFT_OUT
-from flexik.datasets.crane_learning import (
+from flexik.datasets.crane.grid import FAILED, FIELDS, KEPT, LEFT_OUT
+from flexik.datasets.crane.learning import (
     KINDS,
     correction,
     learnt_rows,
@@ -16,7 +16,7 @@ from flexik.datasets.crane_learning import (
     read_learning_data,
     stroke_error_at_tip,
 )
-from flexik.datasets.provenance import grid_checksum, selection_checksum
+from flexik.datasets.crane.provenance import grid_checksum, selection_checksum
 from flexik.datasets.tables import write_table
 from flexik.errors import DataError
 from flexik.mechanisms.crane import forward, inverse

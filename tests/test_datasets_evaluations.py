@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from flexik.datasets.evaluations import (
+from flexik.datasets.crane.evaluations import (
     CONDITION_FIELDS,
     TARGET_FIELDS,
     TOLERANCE_FIELDS,

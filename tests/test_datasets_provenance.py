@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexik.datasets.provenance import (
+from flexik.datasets.crane.provenance import (
     evaluation_checksum,
     fitting_checksum,
     grid_checksum,

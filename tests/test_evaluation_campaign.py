@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flexik.errors import DataError
-from flexik.evaluation.campaign import (
+from flexik.evaluation.crane_measured.campaign import (
     adaptation_statistics,
     campaign_errors,
     campaign_table,

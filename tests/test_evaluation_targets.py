@@ -14,12 +14,14 @@ from flexik.evaluation.targets import (
     reachable_targets,
     solve_targets,
 )
-from flexik.mechanisms.crane import STROKE_LIMIT, forward
-from flexik.multibody.assembly import flexible_crane
-from flexik.multibody.crane import solve, tips
+from flexik.mechanisms.crane import forward
+from flexik.mechanisms.status import ACTUATOR_LIMIT
+from flexik.multibody.crane.assembly import flexible_crane
+from flexik.multibody.crane.model import solve, tips
 from flexik.parameters import load_parameters
+from flexik.positioning.crane.closed_form import closed_form
 from flexik.positioning.method import PositioningError
-from flexik.positioning.rigid_inverse import RigidSolution, closed_form
+from flexik.positioning.rigid_inverse import RigidSolution
 
 LOWER, UPPER, PAYLOAD = (0.0, -4.5), (6.5, 8.0), (30.0, 500.0)
 
@@ -39,7 +41,7 @@ def gantry_inverse(targets, current_strokes, original_targets=None):
     inside = ((targets >= 0.0) & (targets <= 1.0)).all(axis=1)
     strokes = np.column_stack([targets, np.zeros(len(targets))])
     strokes = np.where(inside[:, None], strokes, current_strokes)
-    return RigidSolution(strokes, np.where(inside, 0, STROKE_LIMIT), {})
+    return RigidSolution(strokes, np.where(inside, 0, ACTUATOR_LIMIT), {})
 
 
 def growing(share, strokes, payload):

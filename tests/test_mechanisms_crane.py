@@ -6,16 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flexik.mechanisms.crane import (
-    OUT_OF_REACH,
-    REACHED,
-    STATUS_MEANING,
-    STROKE_LIMIT,
     forward,
     inverse,
     inverse_with_smallest_extension,
     pose,
     smallest_extension,
 )
+from flexik.mechanisms.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED, STATUS_MEANING
 
 LIFT_PIVOT = np.array([-0.09, 1.115])
 LIFT_ARM = np.hypot(2.88, 0.024)  # |BG|
@@ -202,17 +199,17 @@ def test_unreachable_targets_are_flagged(geometry):
     targets = np.array([[9.0, 1.0], [-0.09, 1.2], [0.0, 5.0], [4.0, 1.0], [-3.0, 1.0]])
     solution = inverse(geometry, targets, 0.0)
     assert solution.status.tolist() == [
-        *(OUT_OF_REACH, OUT_OF_REACH, STROKE_LIMIT, REACHED, STROKE_LIMIT)
+        *(OUT_OF_REACH, OUT_OF_REACH, ACTUATOR_LIMIT, REACHED, ACTUATOR_LIMIT)
     ]
     assert solution.reached.tolist() == [False, False, False, True, False]
-    assert set(STATUS_MEANING) == {REACHED, OUT_OF_REACH, STROKE_LIMIT}
+    assert set(STATUS_MEANING) == {REACHED, OUT_OF_REACH, ACTUATOR_LIMIT}
 
 
 def test_nan_stands_for_out_of_reach_and_for_nothing_else(geometry):
     rng = np.random.default_rng(3)
     targets, extension = rng.uniform(-9, 9, (5000, 2)), rng.uniform(0, 1.6, 5000)
     solution = inverse(geometry, targets, extension)
-    assert set(solution.status) == {REACHED, OUT_OF_REACH, STROKE_LIMIT}
+    assert set(solution.status) == {REACHED, OUT_OF_REACH, ACTUATOR_LIMIT}
     nan = np.isnan(solution.strokes)
     assert np.array_equal(nan.all(axis=1), solution.status == OUT_OF_REACH)
     assert np.array_equal(nan.any(axis=1), nan.all(axis=1))
@@ -225,7 +222,7 @@ def test_nan_stands_for_out_of_reach_and_for_nothing_else(geometry):
     far = (radius > LIFT_ARM + outer) | (radius < np.abs(LIFT_ARM - outer))
     assert (solution.status[far] == OUT_OF_REACH).all()
     # needed strokes put the tip there where the linkage can follow
-    needed = solution.status == STROKE_LIMIT
+    needed = solution.status == ACTUATOR_LIMIT
     tip = forward(geometry, solution.strokes[needed])
     follows = np.isfinite(tip).all(axis=1) & (solution.strokes[needed] > -0.3).all(axis=1)
     assert np.abs(tip - targets[needed])[follows].max() < 1e-6
@@ -233,7 +230,7 @@ def test_nan_stands_for_out_of_reach_and_for_nothing_else(geometry):
 
 def test_an_extension_outside_its_cylinder_is_flagged(geometry):
     tip = forward(geometry, [[0.2, 0.3, 1.8]])
-    assert inverse(geometry, tip, 1.8).status.tolist() == [STROKE_LIMIT]
+    assert inverse(geometry, tip, 1.8).status.tolist() == [ACTUATOR_LIMIT]
     assert inverse(geometry, forward(geometry, [[0.2, 0.3, 0.0]]), -0.1).status[0] != REACHED
 
 

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexik.datasets.crane import random_samples
+from flexik.datasets.crane.grid import random_samples
 from flexik.errors import ParameterError, SolverError
 from flexik.mechanisms.crane import forward, pose, rotate
-from flexik.multibody.as_built import (
+from flexik.multibody.crane.assembly import flexible_crane
+from flexik.multibody.crane.model import RODS, CraneModel, tips
+from flexik.multibody.crane_measured.as_built import (
     ENDS,
     PINS,
     AsBuiltCrane,
@@ -19,8 +21,6 @@ from flexik.multibody.as_built import (
     settle,
     settled_tips,
 )
-from flexik.multibody.assembly import flexible_crane
-from flexik.multibody.crane import RODS, CraneModel, tips
 from flexik.parameters import load_parameters
 
 SPRING = 8e6  # N m/rad
@@ -288,7 +288,7 @@ def test_a_model_placed_anew_has_its_pins_in_the_middle(crane):
 
 
 def test_pins_that_do_not_settle_are_an_error(crane, monkeypatch):
-    monkeypatch.setattr("flexik.multibody.as_built.PASSES", 1)
+    monkeypatch.setattr("flexik.multibody.crane_measured.as_built.PASSES", 1)
     twin = with_play(crane, jib_pivot=3e-4)
     with pytest.raises(SolverError, match=r"play does not settle at strokes \(0.1, 0.1, 0.6\) m"):
         settled_tips(twin, PULLED[None], np.array([86.0]))

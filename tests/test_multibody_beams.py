@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_bvp
 
 from flexik.errors import DataError
+from flexik.multibody.beams import Beam, Section, discretise, read_section
 from flexik.multibody.elements import ELEMENTS, place_beam
-from flexik.multibody.structure import Beam, Section, discretise, read_section
 
 LENGTH, EI, EA = 2.0, 2.1e5, 2.1e8
 UNIFORM = Section(np.array([0.0, LENGTH]), np.full(2, 1e-6), np.full(2, 1e-3))

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import virtual_work
 
-from flexik.datasets.crane import random_samples
+from flexik.datasets.crane.grid import random_samples
 from flexik.errors import SolverError
 from flexik.mechanisms.crane import forward
-from flexik.multibody.assembly import flexible_crane
-from flexik.multibody.crane import CraneModel, equilibrium, reference_shapes, solve, tips
+from flexik.multibody.crane.assembly import flexible_crane
+from flexik.multibody.crane.model import CraneModel, equilibrium, reference_shapes, solve, tips
 from flexik.parameters import load_parameters
 
 SPRING = 8e6  # N m/rad

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from smoke_pipeline import CRANE, ROOT
 
-from flexik.datasets.crane import FIELDS
-from flexik.datasets.evaluations import TARGET_FIELDS, TOLERANCE_FIELDS
+from flexik.datasets.crane.evaluations import TARGET_FIELDS, TOLERANCE_FIELDS
+from flexik.datasets.crane.grid import FIELDS
 from flexik.datasets.tables import read_table, stored_fields
 from flexik.learning.storage import load_network
 from flexik.mechanisms.crane import forward

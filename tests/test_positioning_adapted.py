@@ -7,12 +7,15 @@ import pytest
 from smoke_pipeline import ROOT
 
 from flexik.errors import ParameterError
-from flexik.mechanisms.crane import REACHED, forward, inverse_with_smallest_extension, pose
-from flexik.multibody.as_built import Magnitudes, as_built_tips, draw_twin
-from flexik.multibody.assembly import flexible_crane
-from flexik.multibody.crane import equilibrium, tips
+from flexik.mechanisms.crane import forward, inverse_with_smallest_extension, pose
+from flexik.mechanisms.status import REACHED
+from flexik.multibody.crane.assembly import flexible_crane
+from flexik.multibody.crane.model import equilibrium, tips
+from flexik.multibody.crane_measured.as_built import Magnitudes, as_built_tips, draw_twin
 from flexik.parameters import load_parameters
-from flexik.positioning.adapted import (
+from flexik.positioning.combined import Combined
+from flexik.positioning.crane.closed_form import closed_form
+from flexik.positioning.crane_measured.adapted import (
     DIMENSIONS,
     OFFSETS,
     PLAYS,
@@ -24,10 +27,8 @@ from flexik.positioning.adapted import (
     corrected,
     identify,
 )
-from flexik.positioning.combined import Combined
-from flexik.positioning.joint_play import JOINTS, compliance, joint_forces
+from flexik.positioning.crane_measured.joint_play import JOINTS, compliance, joint_forces
 from flexik.positioning.method import PositioningError
-from flexik.positioning.rigid_inverse import closed_form
 
 SETTINGS = AdaptationSettings(
     measurement=0.5e-3,

@@ -9,10 +9,10 @@ from flexik.errors import FlexikError
 from flexik.learning.perceptron import Network, Normalisation, Quantity
 from flexik.mechanisms.crane import forward
 from flexik.parameters import load_parameters
-from flexik.positioning.assembly import crane_method, uncompensated
 from flexik.positioning.combined import Combined
-from flexik.positioning.initial import initial_positions
-from flexik.positioning.inverse import InverseNetwork
+from flexik.positioning.crane.assembly import crane_method, uncompensated
+from flexik.positioning.crane.initial import initial_positions
+from flexik.positioning.crane.inverse import InverseNetwork
 from flexik.positioning.inversion import GaussNewton, GradientDescent
 from flexik.positioning.inverted_network import InvertedNetwork
 from flexik.positioning.none import Uncompensated

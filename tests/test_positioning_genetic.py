@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from flexik.errors import ParameterError
 from flexik.mechanisms.crane import forward
-from flexik.positioning import genetic as module
-from flexik.positioning.genetic import GeneticSettings, first_generation, genetic
-from flexik.positioning.initial import initial_positions
+from flexik.positioning.crane import genetic as module
+from flexik.positioning.crane.genetic import GeneticSettings, first_generation, genetic
+from flexik.positioning.crane.initial import initial_positions
 from flexik.positioning.method import NOT_CONVERGED, REACHED
 
 

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from flexik.evaluation.conditions import all_conditions
-from flexik.mechanisms.crane import OUT_OF_REACH, REACHED, forward, inverse, smallest_extension
-from flexik.positioning import build_method
+from flexik.mechanisms.crane import forward, inverse, smallest_extension
+from flexik.mechanisms.status import OUT_OF_REACH, REACHED
+from flexik.positioning.crane.closed_form import closed_form
+from flexik.positioning.crane.initial import initial_positions
+from flexik.positioning.crane.methods import build_method
 from flexik.positioning.ingredients import Ingredients
-from flexik.positioning.initial import initial_positions
 from flexik.positioning.method import PositioningError
-from flexik.positioning.rigid_inverse import closed_form
 
 
 class RigidCrane:

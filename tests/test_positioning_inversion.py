@@ -13,11 +13,11 @@ from scipy.optimize import least_squares
 from flexik.errors import ParameterError
 from flexik.learning.modular import combine
 from flexik.learning.perceptron import ACTIVATIONS, Network, Normalisation, Quantity
-from flexik.positioning import build_method
+from flexik.positioning.crane.closed_form import closed_form
+from flexik.positioning.crane.methods import build_method
 from flexik.positioning.ingredients import Ingredients
 from flexik.positioning.inversion import GaussNewton, GradientDescent, invert
 from flexik.positioning.method import NOT_CONVERGED, REACHED, PositioningError
-from flexik.positioning.rigid_inverse import closed_form
 
 STROKES = tuple(Quantity(name, "m") for name in ("lift", "jib", "extension"))
 INPUTS = (*STROKES, Quantity("payload", "kg"))

@@ -9,15 +9,16 @@ import pytest
 
 from flexik.errors import ParameterError
 from flexik.evaluation.conditions import all_conditions
-from flexik.mechanisms.crane import REACHED, forward, inverse, smallest_extension
-from flexik.positioning import METHODS, build_method
+from flexik.mechanisms.crane import forward, inverse, smallest_extension
+from flexik.mechanisms.status import REACHED
 from flexik.positioning.combined import Combined
-from flexik.positioning.genetic import GeneticSettings, genetic
+from flexik.positioning.crane.closed_form import closed_form
+from flexik.positioning.crane.genetic import GeneticSettings, genetic
+from flexik.positioning.crane.initial import initial_positions
+from flexik.positioning.crane.methods import METHODS, build_method
 from flexik.positioning.ingredients import Ingredients
-from flexik.positioning.initial import initial_positions
 from flexik.positioning.method import Command, PositioningError
 from flexik.positioning.none import Uncompensated
-from flexik.positioning.rigid_inverse import closed_form
 
 
 class Sag:

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from flexik.errors import UnreachableError
 from flexik.mechanisms import crane
-from flexik.positioning.initial import initial_positions
+from flexik.positioning.crane.closed_form import closed_form
+from flexik.positioning.crane.initial import initial_positions
 from flexik.positioning.method import REACHED, PositioningError
-from flexik.positioning.rigid_inverse import closed_form
 
 # away from the corners of the working area, where round-off decides
 fractions = st.tuples(*[st.floats(0.001, 0.999)] * 3).map(np.array)

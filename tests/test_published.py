@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 from flexik.mechanisms.crane import inverse_with_smallest_extension
-from flexik.multibody.assembly import flexible_crane
-from flexik.multibody.crane import tips
+from flexik.multibody.crane.assembly import flexible_crane
+from flexik.multibody.crane.model import tips
 from flexik.parameters import load_parameters
 
 ROOT = Path(__file__).resolve().parents[1]

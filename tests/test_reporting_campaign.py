@@ -9,10 +9,11 @@ from matplotlib.patches import Rectangle
 
 from flexik.datasets.tables import read_csv
 from flexik.errors import DataError
-from flexik.evaluation.campaign import campaign_errors, campaign_table
+from flexik.evaluation.crane_measured.campaign import campaign_errors, campaign_table
 from flexik.evaluation.errors import STATISTICS
 from flexik.mechanisms.crane import inverse_with_smallest_extension
-from flexik.reporting import campaign_figures, campaign_tables, style
+from flexik.reporting import style
+from flexik.reporting.crane_measured import campaign_figures, campaign_tables
 from flexik.reporting.tables import markdown
 
 REFERENCE = Path(__file__).resolve().parents[1] / "data/reference/crane"

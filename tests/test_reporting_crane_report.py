@@ -10,17 +10,15 @@ import pytest
 from flexik.errors import DataError
 from flexik.evaluation import operations
 from flexik.learning.perceptron import Network, Normalisation, Quantity
-from flexik.mechanisms.crane import STROKE_LIMIT
+from flexik.mechanisms.status import ACTUATOR_LIMIT
 from flexik.parameters import load_parameters
 from flexik.positioning.method import NOT_CONVERGED
-from flexik.reporting import (
-    crane_notes,
-    crane_report,
-    crane_results,
-    crane_tables,
-    learning_tables,
-    measured_report,
-)
+from flexik.reporting.crane import learning_tables
+from flexik.reporting.crane import notes as crane_notes
+from flexik.reporting.crane import report as crane_report
+from flexik.reporting.crane import results as crane_results
+from flexik.reporting.crane import tables as crane_tables
+from flexik.reporting.crane_measured import report as measured_report
 
 ROOT = Path(__file__).parents[1]
 
@@ -150,7 +148,7 @@ def test_payloads_beyond_the_trained_ones_are_counted():
 
 
 def test_failures_are_told_with_their_reasons():
-    status = [0, NOT_CONVERGED, STROKE_LIMIT, NOT_CONVERGED]
+    status = [0, NOT_CONVERGED, ACTUATOR_LIMIT, NOT_CONVERGED]
     frames = {"none": frame([0.1] * 4), "new": frame([0.1] * 4, status)}
     assert crane_notes.failure_notes(frames) == [
         "new: failed conditions: 3 (needs a stroke outside the cylinder: 1; search ended above its "

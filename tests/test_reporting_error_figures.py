@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from flexik.evaluation.errors import STATISTICS, comparison
-from flexik.reporting import error_figures, style
+from flexik.reporting import style
+from flexik.reporting.crane import error_figures
 
 
 @pytest.fixture(autouse=True)

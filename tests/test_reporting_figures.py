@@ -12,8 +12,11 @@ from matplotlib.patches import Polygon
 from flexik.errors import DataError
 from flexik.evaluation.errors import STATISTICS
 from flexik.mechanisms.crane import forward, pose
-from flexik.positioning.initial import initial_positions
-from flexik.reporting import crane_figures, crane_schematic, error_figures, style
+from flexik.positioning.crane.initial import initial_positions
+from flexik.reporting import style
+from flexik.reporting.crane import error_figures
+from flexik.reporting.crane import figures as crane_figures
+from flexik.reporting.crane import schematic as crane_schematic
 
 
 @pytest.fixture(autouse=True)

@@ -9,7 +9,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from flexik.errors import DataError
 from flexik.learning.size_selection import by_size
-from flexik.reporting import crane_figures, fitting_figures, style
+from flexik.reporting import style
+from flexik.reporting.crane import figures as crane_figures
+from flexik.reporting.crane import fitting_figures
 
 PANELS = ("2 hidden neurons: too few", "14 hidden neurons", "200 hidden neurons: too many")
 

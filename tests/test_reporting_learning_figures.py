@@ -6,7 +6,8 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from flexik.errors import DataError
-from flexik.reporting import learning_figures, style
+from flexik.reporting import style
+from flexik.reporting.crane import learning_figures
 
 
 @pytest.fixture(autouse=True)

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from flexik.errors import DataError
-from flexik.reporting import method_figures, style
+from flexik.reporting import style
+from flexik.reporting.crane import method_figures
 
 
 @pytest.fixture(autouse=True)

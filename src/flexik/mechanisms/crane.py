@@ -15,19 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexik.errors import ParameterError
+from flexik.mechanisms.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float]
 
 # A stroke this far outside its limits is round-off of a target on the border, m
 STROKE_TOLERANCE = 1e-10
-
-REACHED, OUT_OF_REACH, STROKE_LIMIT = 0, 1, 2
-STATUS_MEANING = {
-    REACHED: "reached",
-    OUT_OF_REACH: "farther or nearer than the links allow",
-    STROKE_LIMIT: "needs a stroke outside the cylinder",
-}
 
 
 @dataclass(frozen=True)
@@ -97,7 +91,7 @@ class CranePose(NamedTuple):
 class InverseSolution(NamedTuple):
     """Strokes (n, 3) in m and a status (n,) of STATUS_MEANING.
 
-    Rows with OUT_OF_REACH hold NaN strokes; rows with STROKE_LIMIT hold the strokes that would be
+    Rows with OUT_OF_REACH hold NaN strokes; rows with ACTUATOR_LIMIT hold the strokes that would be
     needed.
     """
 
@@ -338,7 +332,7 @@ def _inverse_branch(
         allowed = (strokes >= -STROKE_TOLERANCE) & (strokes <= maximum + STROKE_TOLERANCE)
     inside = np.all(allowed, axis=1)
     strokes = np.where(inside[:, None], np.clip(strokes, 0.0, maximum), strokes)
-    status = np.where(unsolved, OUT_OF_REACH, np.where(inside, REACHED, STROKE_LIMIT))
+    status = np.where(unsolved, OUT_OF_REACH, np.where(inside, REACHED, ACTUATOR_LIMIT))
     return InverseSolution(strokes, status)
 
 

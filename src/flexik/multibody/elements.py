@@ -13,7 +13,7 @@ from typing import Any
 import exudyn as exu
 import numpy as np
 
-from flexik.multibody.structure import Array, Elements, nearest
+from flexik.multibody.beams import Array, Elements, nearest
 
 # Node and element in Exudyn: dictionaries, which it takes two to three times faster than its item
 # classes, but without complaint about unknown keys

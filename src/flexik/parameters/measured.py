@@ -18,7 +18,7 @@ from flexik.parameters.model import (
 
 
 class Deviations(Model):
-    """How far a crane may be off, see multibody.as_built.Magnitudes."""
+    """How far a crane may be off, see multibody.crane_measured.as_built.Magnitudes."""
 
     pivot: NotNegative
     length: NotNegative
@@ -31,7 +31,7 @@ class Deviations(Model):
 
 
 class Expected(Model):
-    """What the adaptation expects before it has measured, see positioning.adapted."""
+    """What an adaptation expects before measuring, see positioning.crane_measured.adapted."""
 
     measurement: Positive
     repeatability: NotNegative

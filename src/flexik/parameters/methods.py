@@ -8,7 +8,7 @@ from flexik.parameters.model import Count, Model, Name, Positive, Seed
 
 
 class Genetic(Model):
-    """Genetic rigid inverse, see positioning.genetic."""
+    """Genetic rigid inverse, see positioning.crane.genetic."""
 
     n_individuals: Annotated[int, Field(ge=2)]
     n_current: Annotated[int, Field(ge=0)]
@@ -71,7 +71,7 @@ class InvertedModel(_Method):
 
 
 class InverseModel(_Method):
-    """See positioning.inverse."""
+    """See positioning.crane.inverse."""
 
     method: Literal["inverse"]
 

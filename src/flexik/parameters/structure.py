@@ -35,7 +35,7 @@ class Geometry(Model):
 
 
 class BeamModel(Model):
-    """One beam, see multibody.structure.Beam."""
+    """One beam, see multibody.beams.Beam."""
 
     section: str
     span: Interval
@@ -71,7 +71,7 @@ class RodModel(Model):
 
 
 class Structure(Model):
-    """What bends and weighs, see multibody.structure.CraneStructure."""
+    """What bends and weighs, see multibody.crane.structure.CraneStructure."""
 
     element: Literal["geometrically_exact", "ancf"]
     youngs_modulus: Positive

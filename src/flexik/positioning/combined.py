@@ -4,6 +4,7 @@ Source: Rouvinen 1999, section 4.1 and figure 4.7.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -56,7 +57,7 @@ class Combined:
         return Command(strokes, status, diagnostics)
 
 
-def build(ingredients: Ingredients, n_corrections: int = 1) -> Combined:
+def build(ingredients: Ingredients[Any], n_corrections: int = 1) -> Combined:
     """Build method `combined` with the inverse and the network `deflection` of `ingredients`."""
     network = take_network(ingredients.networks, "deflection")
     return Combined(ingredients.inverse, network, n_corrections)

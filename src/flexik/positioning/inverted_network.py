@@ -1,6 +1,7 @@
 """What `direct` and `modular` share: the inverse of a network that predicts the tip."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -18,6 +19,15 @@ from flexik.positioning.method import (
 )
 
 
+class HasStrokes(Protocol):
+    """A geometry whose strokes begin at zero."""
+
+    @property
+    def stroke_maximum(self) -> tuple[float, ...]:
+        """Longest strokes, m."""
+        ...
+
+
 @dataclass(frozen=True)
 class InvertedNetwork:
     """Strokes at which a network predicts the target as its tip, searched from the current ones.
@@ -32,15 +42,15 @@ class InvertedNetwork:
     """
 
     network: perceptron.Network
-    stroke_maximum: tuple[float, float, float]
+    stroke_maximum: tuple[float, ...]
     inversion: GradientDescent | GaussNewton
 
     def __call__(self, targets: Array, payload: Array, initial_strokes: Array) -> Command:
         """See `flexik.positioning.method.Method`."""
         targets = checked("targets", targets, None, 2)
         payload = checked("payload", payload, len(targets))
-        initial = checked("initial strokes", initial_strokes, len(targets), 3)
         maximum = np.array(self.stroke_maximum)
+        initial = checked("initial strokes", initial_strokes, len(targets), len(maximum))
         found = invert(self.network, targets, payload[:, None], initial, maximum, self.inversion)
         status = np.where(found.converged, REACHED, NOT_CONVERGED)
         diagnostics = {
@@ -52,7 +62,7 @@ class InvertedNetwork:
 
 
 def inverted(
-    ingredients: Ingredients, name: str, inversion: GradientDescent | GaussNewton
+    ingredients: Ingredients[HasStrokes], name: str, inversion: GradientDescent | GaussNewton
 ) -> InvertedNetwork:
     """Inverse of the network `name` of `ingredients`, which must be a perceptron."""
     network = take_network(ingredients.networks, name)

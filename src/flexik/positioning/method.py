@@ -1,4 +1,8 @@
-"""What every positioning method takes and gives: targets and payloads in, commanded strokes out."""
+"""What every positioning method takes and gives: targets and payloads in, commanded strokes out.
+
+Strokes stand for the actuator coordinates of any mechanism: (n, k), strokes in m or joint angles in
+rad.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,14 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flexik.errors import FlexikError
-from flexik.mechanisms import crane
+from flexik.mechanisms import status
 
 Array = NDArray[np.float64]
 Diagnostics = dict[str, NDArray]
 
-REACHED = crane.REACHED
+REACHED = status.REACHED
 NOT_CONVERGED = 3
-STATUS_MEANING = {**crane.STATUS_MEANING, NOT_CONVERGED: "search ended above its tolerance"}
+STATUS_MEANING = {**status.STATUS_MEANING, NOT_CONVERGED: "search ended above its tolerance"}
 
 
 class PositioningError(FlexikError):
@@ -26,7 +30,7 @@ class PositioningError(FlexikError):
 class Command:
     """Commanded strokes; a row that failed still holds strokes the manipulator can take.
 
-    strokes : (n, 3) in m.
+    strokes : (n, k) in m, or joint angles in rad.
     status : (n,), codes of STATUS_MEANING.
     diagnostics : arrays (n,) by name.
     """
@@ -49,7 +53,7 @@ class Method(Protocol):
     def __call__(self, targets: Array, payload: Array, initial_strokes: Array) -> Command:
         """Strokes for `targets` (n, 2) in m under `payload` (n,) in kg.
 
-        `initial_strokes` (n, 3) in m are the current ones; they choose among the many stroke
+        `initial_strokes` (n, k) are the current ones; they choose among the many stroke
         combinations that reach a target, and stay where a method finds none.
         """
         ...

@@ -1,6 +1,7 @@
 """Method `none`: the rigid inverse alone; the deflection stays as the error."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from flexik.positioning.ingredients import Ingredients
 from flexik.positioning.method import Array, Command
@@ -18,6 +19,6 @@ class Uncompensated:
         return Command(*self.inverse(targets, initial_strokes))
 
 
-def build(ingredients: Ingredients) -> Uncompensated:
+def build(ingredients: Ingredients[Any]) -> Uncompensated:
     """Build method `none` with the rigid inverse of `ingredients`."""
     return Uncompensated(ingredients.inverse)

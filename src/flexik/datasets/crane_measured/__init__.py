@@ -1,0 +1,1 @@
+"""Campaigns on a measured crane, and what is learnt from them."""

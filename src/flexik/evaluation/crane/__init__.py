@@ -1,0 +1,1 @@
+"""What is judged on the crane alone: calibration and the measured campaign."""

@@ -1,0 +1,175 @@
+"""Beams as data, and their reduction to finite elements (NumPy only)."""
+
+import warnings
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexik.errors import DataError
+
+Array = NDArray[np.float64]
+
+SECTION_COLUMNS = ("x_m", "Iz_m4", "A_m2")
+
+# Below this distance two stations of a beam share a node: short elements are so stiff that the
+# round-off floor of the solver rises above its tolerance, m
+MERGE_DISTANCE = 0.03
+
+# Gauss-Legendre points and weights on [0, 1], a panel between two rows of a section table
+_GAUSS_X, _GAUSS_W = (
+    (np.polynomial.legendre.leggauss(4)[0] + 1) / 2,
+    np.polynomial.legendre.leggauss(4)[1] / 2,
+)
+
+
+@dataclass(frozen=True)
+class Section:
+    """Section along a beam, linear between rows and constant beyond: abscissa m, Iz m4, A m2."""
+
+    abscissa: Array
+    second_moment: Array
+    area: Array
+
+    def second_moment_at(self, abscissa: Array) -> Array:
+        """Second moment of area about the bending axis, m4."""
+        return np.interp(abscissa, self.abscissa, self.second_moment)
+
+    def area_at(self, abscissa: Array) -> Array:
+        """Area, m2."""
+        return np.interp(abscissa, self.abscissa, self.area)
+
+
+@dataclass(frozen=True)
+class Beam:
+    """A straight flexible link; abscissas in m along its axis, in the link's own frame.
+
+    span : first and last abscissa of the modelled axis.
+    mass, centre_of_mass : total mass in kg and abscissa of its centre in m.
+    mass_span : abscissas between which the mass lies; its density follows the area of the section
+        times a linear factor that gives the mass and its centre.
+    mass_offset : distance of the centre of mass from the axis, positive to the left, m.
+    n_elements : elements of equal length; pins and pads add nodes.
+    """
+
+    section: Section
+    youngs_modulus: float
+    span: tuple[float, float]
+    mass: float
+    centre_of_mass: float
+    mass_span: tuple[float, float]
+    mass_offset: float
+    n_elements: int
+
+
+@dataclass(frozen=True)
+class Elements:
+    """Finite elements of a beam: stations (m + 1,) in m, and arrays (m,) over the elements.
+
+    pins : the station nearest to each pin that was asked for.
+    bending_stiffness : L / int dx/EI, N m2.
+    axial_stiffness : L / int dx/EA, N.
+    residual_flexibility : int (x - middle)^2 dx/EI, m/N: what an element of constant curvature
+        lacks.
+    node_mass : (m + 1,), kg, statically equivalent to the distributed mass.
+    """
+
+    stations: Array
+    pins: tuple[int, ...]
+    bending_stiffness: Array
+    axial_stiffness: Array
+    residual_flexibility: Array
+    node_mass: Array
+
+
+def read_section(path: Path | str) -> Section:
+    """Read a section table: CSV with columns x_m, Iz_m4, A_m2, x strictly increasing.
+
+    Raises DataError if the file is missing, lacks a column, or holds a value that is no section.
+    """
+    path = Path(path)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # NumPy only warns of an empty file
+            table = np.genfromtxt(path, delimiter=",", names=True, dtype=float, encoding="utf-8")
+    except (OSError, ValueError, IndexError, UserWarning) as error:
+        reason = " ".join(str(error).split())
+        raise DataError(f"section table {path}: cannot be read ({reason})") from None
+    if table.dtype.names != SECTION_COLUMNS:
+        raise DataError(f"section table {path}: columns {table.dtype.names}, not {SECTION_COLUMNS}")
+    x, second_moment, area = (np.atleast_1d(table[name]) for name in SECTION_COLUMNS)
+    if len(x) < 2 or not (np.diff(x) > 0).all():
+        raise DataError(f"section table {path}: x_m must increase over at least two rows")
+    if not ((second_moment > 0).all() and (area > 0).all()):
+        raise DataError(f"section table {path}: Iz_m4 and A_m2 must be positive numbers")
+    return Section(x, second_moment, area)
+
+
+def discretise(beam: Beam, pins: tuple[float, ...], refinement: int = 1) -> Elements:
+    """Cut `beam` into elements with a node at every abscissa of `pins` and at both ends.
+
+    No element is longer than the span over `n_elements * refinement`; pins closer than
+    MERGE_DISTANCE to another station share its node.
+    """
+    stations = [beam.span[0], beam.span[1]]
+    for pin in pins:
+        if min(abs(pin - s) for s in stations) > MERGE_DISTANCE:
+            stations.append(pin)
+    stations.sort()
+    longest = (beam.span[1] - beam.span[0]) / (beam.n_elements * refinement)
+    mesh = [stations[0]]
+    for start, end in pairwise(stations):
+        n = max(1, int(np.ceil((end - start) / longest - 1e-6)))
+        mesh += list(np.linspace(start, end, n + 1)[1:])
+    return _reduce(beam, np.array(mesh), pins)
+
+
+def nearest(stations: Array, abscissa: float) -> int:
+    """Number of the station nearest to `abscissa` in m."""
+    return int(np.abs(stations - abscissa).argmin())
+
+
+def _reduce(beam: Beam, stations: Array, pins: tuple[float, ...]) -> Elements:
+    """Integrate section and mass over the elements between `stations`."""
+    x, w, element = _quadrature(beam, stations)
+    n = len(stations) - 1
+    length = np.diff(stations)
+    flexibility = 1.0 / (beam.youngs_modulus * beam.section.second_moment_at(x))
+    middle = (stations[:-1] + stations[1:]) / 2
+    bending = _sums(element, w * flexibility, n)
+    axial = _sums(element, w / (beam.youngs_modulus * beam.section.area_at(x)), n)
+    residual = _sums(element, w * flexibility * (x - middle[element]) ** 2, n)
+
+    weight = w * _relative_density(beam, x)
+    moments = np.array([np.sum(weight), np.sum(weight * x), np.sum(weight * x**2)])
+    factor = np.linalg.solve(
+        [moments[:2], moments[1:]], [beam.mass, beam.mass * beam.centre_of_mass]
+    )
+    slice_mass = weight * (factor[0] + factor[1] * x)
+    along = (x - stations[element]) / length[element]
+    node_mass = _sums(element, slice_mass * (1 - along), n + 1)
+    node_mass += _sums(element + 1, slice_mass * along, n + 1)
+    nodes = tuple(nearest(stations, pin) for pin in pins)
+    return Elements(stations, nodes, length / bending, length / axial, residual, node_mass)
+
+
+def _sums(group: NDArray[np.int64], values: Array, n_groups: int) -> Array:
+    return np.bincount(group, values, n_groups).astype(np.float64)
+
+
+def _relative_density(beam: Beam, x: Array) -> Array:
+    inside = (x >= beam.mass_span[0]) & (x <= beam.mass_span[1])
+    return np.where(inside, beam.section.area_at(x), 0.0)
+
+
+def _quadrature(beam: Beam, stations: Array) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Abscissas, weights and element numbers; panels end at stations, table rows and mass ends."""
+    cuts = np.concatenate([stations, beam.section.abscissa, beam.mass_span])
+    cuts = np.unique(cuts[(cuts >= stations[0]) & (cuts <= stations[-1])])
+    width = np.diff(cuts)
+    x = (cuts[:-1, None] + width[:, None] * _GAUSS_X).ravel()
+    w = (width[:, None] * _GAUSS_W).ravel()
+    element = np.searchsorted(stations, x, side="right") - 1
+    return x, w, element

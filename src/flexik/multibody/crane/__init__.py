@@ -1,0 +1,1 @@
+"""The flexible crane, nominal and as built."""

@@ -1,0 +1,50 @@
+"""The flexible crane as params.yaml describes it."""
+
+import math
+from pathlib import Path
+
+from flexik import parameters
+from flexik.errors import DataError
+from flexik.files import read_json
+from flexik.mechanisms.crane import CraneGeometry
+from flexik.multibody.beams import Beam, read_section
+from flexik.multibody.crane.model import FlexibleCrane
+from flexik.multibody.crane.structure import CraneStructure, Rod
+
+
+def flexible_crane(crane: parameters.Crane, spring_stiffness: float) -> FlexibleCrane:
+    """Build the crane of section `crane` on a ground spring of `spring_stiffness` N m/rad.
+
+    Raises DataError if a section table cannot be read.
+    """
+    given = crane.structure
+    beams = {name: _beam(given, name) for name in type(given.beams).model_fields}
+    structure = CraneStructure(
+        **beams,
+        rocker=Rod(given.rocker.mass, given.rocker.centre_of_mass),
+        coupler=Rod(given.coupler.mass, given.coupler.centre_of_mass),
+        lift_axis_height=given.lift_axis_height,
+        jib_axis_height=given.jib_axis_height,
+        gravity=given.gravity,
+    )
+    geometry = CraneGeometry(**crane.geometry.model_dump())
+    return FlexibleCrane(geometry, structure, spring_stiffness, given.element)
+
+
+def read_spring_stiffness(path: Path | str) -> float:
+    """Fitted ground spring in N m/rad; raises DataError if the file is missing or damaged."""
+    calibration = read_json(path)
+    stiffness = calibration.get("spring_stiffness") if isinstance(calibration, dict) else None
+    if not isinstance(stiffness, float | int) or not 0.0 < stiffness < math.inf:
+        raise DataError(f"{path}: expected a positive number spring_stiffness, got {stiffness!r}")
+    return float(stiffness)
+
+
+def _beam(structure: parameters.Structure, name: str) -> Beam:
+    given = getattr(structure.beams, name)
+    try:
+        section = read_section(given.section)
+    except DataError as error:
+        raise DataError(f"crane.structure.beams.{name}.section: {error}") from None
+    others = given.model_dump(exclude={"section"})
+    return Beam(section=section, youngs_modulus=structure.youngs_modulus, **others)

@@ -1,0 +1,89 @@
+"""What bends and weighs in the crane, as data, and its meshes (NumPy only)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flexik.mechanisms.crane import CraneGeometry
+from flexik.multibody.beams import Beam, Elements, discretise
+
+BEAMS = ("pillar", "lift", "jib", "extension")
+# Beams whose mesh depends on the extension stroke: the pads slide on them
+SLIDING = ("jib", "extension")
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A rigid two-pin link: mass in kg and distance of its centre from its first pin in m."""
+
+    mass: float
+    centre_of_mass: float
+
+
+@dataclass(frozen=True)
+class CraneStructure:
+    """What bends and weighs. Lengths in m, masses in kg.
+
+    axis_height : height of the lift and jib axes above B and G in the lift and jib frames.
+
+    The front pad sits at the end of the jib, the rear pad at the rear end of the extension.
+    """
+
+    pillar: Beam
+    lift: Beam
+    jib: Beam
+    extension: Beam
+    rocker: Rod
+    coupler: Rod
+    lift_axis_height: float
+    jib_axis_height: float
+    gravity: float
+
+    @property
+    def front_pad(self) -> float:
+        """Abscissa of the front pad, jib frame."""
+        return self.jib.span[1]
+
+    @property
+    def extension_length(self) -> float:
+        """Rear end to tip."""
+        return self.extension.span[1] - self.extension.span[0]
+
+
+@dataclass(frozen=True)
+class FlexibleCrane:
+    """A crane whose equilibria can be computed.
+
+    spring_stiffness : of the ground connection, N m/rad.
+    element : one of multibody.elements.ELEMENTS.
+    refinement : every beam is cut into this many times its n_elements.
+    """
+
+    geometry: CraneGeometry
+    structure: CraneStructure
+    spring_stiffness: float
+    element: str = "geometrically_exact"
+    refinement: int = 1
+
+    def rear_pad(self, extension: float) -> float:
+        """Abscissa of the rear pad at stroke `extension`, jib frame, m."""
+        start = self.geometry.extension_start_in_jib[0]
+        return start + extension - self.structure.extension_length
+
+
+Meshes = dict[str, Elements]
+
+
+def beam_meshes(crane: FlexibleCrane, extension: float, names: Sequence[str] = BEAMS) -> Meshes:
+    """Meshes of the beams `names` at stroke `extension` in m, with a node at every pin and pad."""
+    geometry, rear_pad = crane.geometry, crane.rear_pad(extension)
+    pins = {
+        "pillar": (geometry.lift_pivot[1] + geometry.lift_cylinder_base[1],),
+        "lift": (
+            geometry.lift_cylinder_head[0],
+            geometry.jib_cylinder_base_in_lift[0],
+            geometry.rocker_pivot_in_lift[0],
+        ),
+        "jib": (geometry.coupler_pin[0], 0.0, rear_pad),
+        "extension": (crane.structure.front_pad - rear_pad,),
+    }
+    return {n: discretise(getattr(crane.structure, n), pins[n], crane.refinement) for n in names}

@@ -1,0 +1,1 @@
+"""The crane as it was built."""

@@ -1,0 +1,1 @@
+"""What positions the crane alone: its rigid inverses, adaptation, methods from parameters."""

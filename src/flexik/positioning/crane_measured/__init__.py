@@ -1,0 +1,1 @@
+"""Correcting the compensator of the crane by measurements."""
