@@ -22,18 +22,17 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 from training_race import pinned_pool
 
-from flexik import parameters, stage
+from flexik import stage
 from flexik.datasets.crane.evaluations import TARGET_FIELDS
-from flexik.datasets.crane.provenance import network_checksum, query_checksum, targets_checksum
+from flexik.datasets.crane.provenance import query_checksum, targets_checksum
 from flexik.datasets.tables import read_table
 from flexik.errors import DataError
 from flexik.evaluation.conditions import Conditions, all_conditions, random_conditions
-from flexik.learning.storage import load_network
 from flexik.mechanisms.crane import CraneGeometry
 from flexik.multibody.crane.assembly import read_spring_stiffness
 from flexik.parameters import load_parameters
-from flexik.positioning.crane.assembly import crane_method, uncompensated
 from flexik.positioning.crane.initial import initial_positions
+from flexik.positioning.crane.trained import trained_method
 from flexik.positioning.method import Method
 from flexik.reporting.tables import markdown, write_table
 
@@ -81,7 +80,10 @@ def cases() -> dict[str, Case]:
         stiffness = read_spring_stiffness(DATA / "calibration.json")
         made_with = targets_checksum(crane, stiffness)
         table = read_table(DATA / "targets.parquet", TARGET_FIELDS, made_with)
-        methods = build_methods(crane, geometry, stiffness)
+        methods = {
+            name: trained_method(crane, name, geometry, stiffness, DATA / "networks")
+            for name in ("none", *crane.methods)
+        }
     except DataError as error:
         raise DataError(f"run `make repro` first: {error}") from error
     conditions = all_conditions(crane.evaluation.points, crane.evaluation.payloads)
@@ -93,22 +95,6 @@ def cases() -> dict[str, Case]:
         batch = random_conditions(rows[["target_x", "target_y"]], rows["payload"])
         found[name] = Case(method, single, Queries.of(batch, geometry))
     return found
-
-
-def build_methods(
-    crane: parameters.Crane, geometry: CraneGeometry, stiffness: float
-) -> dict[str, Method]:
-    """`none`, then the methods of params.yaml with their trained networks."""
-    methods: dict[str, Method] = {"none": uncompensated(geometry)}
-    for name, chosen in crane.methods.items():
-        path = DATA / "networks" / f"{chosen.network}.json"
-        made_with = network_checksum(crane, stiffness, chosen.network)
-        try:
-            network, _ = load_network(path, made_with)
-        except DataError as error:
-            raise DataError(f"method {name}: {error}") from error
-        methods[name] = crane_method(chosen, geometry, network)
-    return methods
 
 
 def seconds_single(method: Method, queries: Queries) -> float:

@@ -1,12 +1,15 @@
 """Correct the compensator by a few measurements, on many cranes as built, and judge it.
 
-Reads params.yaml: parallel, crane.measured, crane.geometry, crane.structure, the compensating
-method under crane.methods (and crane.grid, crane.selection, networks and trainers to know which
-network belongs to it); data/crane/calibration.json; its network.
-Writes data/crane/adaptation.parquet, a row for every crane, number of measurements and target.
+Reads params.yaml: parallel, crane.measured.method, crane.measured.noise, crane.measured.deviations,
+crane.measured.adaptation, crane.geometry, crane.structure, the compensating methods under
+crane.methods (and crane.grid, crane.selection, networks and trainers to know which networks belong
+to them); data/crane/calibration.json; their networks.
+Writes data/crane/adaptation.parquet, a row for every crane, method, number of measurements and
+target.
 """
 
 import functools
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,15 +17,14 @@ import numpy as np
 import pandas as pd
 
 from flexik import parameters, stage
-from flexik.datasets.crane.provenance import measured_checksum, network_checksum
-from flexik.datasets.crane_measured.fields import ADAPTATION_FIELDS
+from flexik.datasets.crane.provenance import adaptation_checksum
+from flexik.datasets.crane_measured.fields import ADAPTATION_FIELDS, ADAPTED, MISJUDGED
 from flexik.datasets.parallel import ParallelSettings, from_environment, parallel_map
 from flexik.datasets.tables import write_table
 from flexik.errors import ParameterError
 from flexik.evaluation.conditions import Conditions, random_conditions
 from flexik.evaluation.targets import draw_candidates
 from flexik.learning.perceptron import Network
-from flexik.learning.storage import load_network
 from flexik.mechanisms.crane import smallest_extension
 from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
 from flexik.multibody.crane.structure import FlexibleCrane
@@ -33,8 +35,8 @@ from flexik.multibody.crane_measured.as_built import (
     draw_twin,
 )
 from flexik.parameters import load_parameters
-from flexik.positioning.crane.assembly import crane_method
 from flexik.positioning.crane.initial import initial_positions
+from flexik.positioning.crane.trained import trained_method, trained_network
 from flexik.positioning.crane_measured.adapted import (
     AdaptationSettings,
     Adapted,
@@ -57,7 +59,7 @@ class Study:
     measured: parameters.Measured
     nominal: FlexibleCrane
     network: Network
-    compensator: Method
+    baselines: Mapping[str, Method]  # of the nominal crane; the first is what is adapted
 
 
 def main() -> None:
@@ -66,13 +68,13 @@ def main() -> None:
     crane = given.crane
     stiffness = read_spring_stiffness(FOLDER / "calibration.json")
     nominal = flexible_crane(crane, stiffness)
-    chosen = crane.methods[crane.measured.adaptation.method]
-    network, _ = load_network(
-        FOLDER / "networks" / f"{chosen.network}.json",
-        network_checksum(crane, stiffness, chosen.network),
-    )
-    compensator = crane_method(chosen, nominal.geometry, network)
-    study = Study(crane.measured, nominal, network, compensator)
+    label, folder = crane.measured.adaptation.method, FOLDER / "networks"
+    network = trained_network(crane, crane.methods[label].network, stiffness, folder)
+    baselines = {
+        name: trained_method(crane, name, nominal.geometry, stiffness, folder)
+        for name in (label, crane.measured.method)
+    }
+    study = Study(crane.measured, nominal, network, baselines)
     settings = from_environment(ParallelSettings(**given.parallel.model_dump()))
     numbers = range(crane.measured.adaptation.n_cranes)
     found = parallel_map(functools.partial(errors_of, study), numbers, settings, "adaptation")
@@ -81,14 +83,15 @@ def main() -> None:
         FOLDER / "adaptation.parquet",
         {field.name: table[field.name].to_numpy() for field in ADAPTATION_FIELDS},
         ADAPTATION_FIELDS,
-        measured_checksum(crane, stiffness),
+        adaptation_checksum(crane, stiffness),
     )
-    means = 1e3 * table.groupby("n_measurements")["error"].mean()
+    own = table[table["method"].isin([label, ADAPTED])]
+    means = 1e3 * own.groupby("n_measurements")["error"].mean()
     print(", ".join(f"{n} measurements: mean {mean:.2f} mm" for n, mean in means.items()))
 
 
 def errors_of(study: Study, number: int) -> pd.DataFrame:
-    """Errors of the compensator on crane `number`, unadapted and adapted."""
+    """Errors on crane `number`, of the methods of the nominal crane and adapted."""
     measured, settings = study.measured, study.measured.adaptation
     seed = settings.seed + number
     twin = draw_twin(study.nominal, Magnitudes(**measured.deviations.model_dump()), seed)
@@ -96,19 +99,25 @@ def errors_of(study: Study, number: int) -> pd.DataFrame:
     most = settings.n_measurements[-1]
     conditions = drawn(study, most + settings.n_targets, generator)
     learn, judge = conditions[:most], conditions[most:]
-    strokes, tip = approached(study.compensator, learn, study, twin, generator)
+    strokes, tip = approached(next(iter(study.baselines.values())), learn, study, twin, generator)
     tip = tip + measured.noise * generator.standard_normal(tip.shape)
-    expected = AdaptationSettings(**settings.expected.model_dump())
-    methods: dict[int, Method] = {0: study.compensator}
-    for n in settings.n_measurements:
-        measurements = Measurements(strokes[:n], learn.payload[:n], tip[:n])
-        offsets = identify(study.nominal, study.network, measurements, expected)
-        methods[n] = Adapted(study.nominal, study.network, offsets, settings.n_corrections)
+    right = AdaptationSettings(**settings.expected.model_dump())
+    methods: dict[tuple[str, int], Method] = {
+        (label, 0): method for label, method in study.baselines.items()
+    }
+    for label, expected in ((ADAPTED, right), (MISJUDGED, right.misjudged(settings.misjudged))):
+        for n in settings.n_measurements:
+            measurements = Measurements(strokes[:n], learn.payload[:n], tip[:n])
+            offsets = identify(study.nominal, study.network, measurements, expected)
+            methods[label, n] = Adapted(
+                study.nominal, study.network, offsets, settings.n_corrections
+            )
     tables = []
-    for n, method in methods.items():
+    for (label, n), method in methods.items():
         reached = approached(method, judge, study, twin, generator)[1]
         columns = {
             "twin": number,
+            "method": label,
             "n_measurements": n,
             "target_x": judge.targets[:, 0],
             "target_y": judge.targets[:, 1],

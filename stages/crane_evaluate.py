@@ -15,22 +15,17 @@ from flexik.datasets.crane.evaluations import TARGET_FIELDS, write_evaluation
 from flexik.datasets.crane.grid import parallel_tips
 from flexik.datasets.crane.provenance import (
     evaluation_checksum,
-    network_checksum,
     targets_checksum,
     workspace_checksum,
 )
 from flexik.datasets.parallel import ParallelSettings, from_environment
 from flexik.datasets.tables import read_table
-from flexik.errors import ParameterError
 from flexik.evaluation.conditions import Conditions, all_conditions, random_conditions
 from flexik.evaluation.errors import evaluate, statistics
-from flexik.learning.storage import load_network
-from flexik.mechanisms.crane import CraneGeometry
 from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
 from flexik.parameters import load_parameters
-from flexik.positioning.crane.assembly import crane_method, uncompensated
 from flexik.positioning.crane.initial import initial_positions
-from flexik.positioning.method import Method
+from flexik.positioning.crane.trained import trained_method
 
 FOLDER = Path("data/crane")
 
@@ -41,7 +36,7 @@ def main() -> None:
     crane, label = given.crane, stage.argument("METHOD")
     stiffness = read_spring_stiffness(FOLDER / "calibration.json")
     model = flexible_crane(crane, stiffness)
-    method = chosen_method(crane, label, model.geometry, stiffness)
+    method = trained_method(crane, label, model.geometry, stiffness, FOLDER / "networks")
     settings = from_environment(ParallelSettings(**given.parallel.model_dump()))
     tips = functools.partial(parallel_tips, model, settings=settings, description=label)
     for folder, conditions, made_with in (
@@ -66,22 +61,6 @@ def main() -> None:
                 f"max {1e3 * found['max_error']:.2f} mm, "
                 f"{found['n_failed']} of {found['n_conditions']} failed"
             )
-
-
-def chosen_method(
-    crane: parameters.Crane, label: str, geometry: CraneGeometry, stiffness: float
-) -> Method:
-    """Method `label` of params.yaml, ready to be called."""
-    if label == "none":
-        return uncompensated(geometry)
-    if label not in crane.methods:
-        raise ParameterError(f"crane.methods: there is no {label!r} ({', '.join(crane.methods)})")
-    chosen = crane.methods[label]
-    network, _ = load_network(
-        FOLDER / "networks" / f"{chosen.network}.json",
-        network_checksum(crane, stiffness, chosen.network),
-    )
-    return crane_method(chosen, geometry, network)
 
 
 def workspace(crane: parameters.Crane, stiffness: float, label: str) -> Conditions:

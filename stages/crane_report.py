@@ -4,8 +4,9 @@ Reads params.yaml: crane; what the other crane stages wrote; the published value
 the benchmarks wrote.
 Writes reports/crane/: positioning_errors, positioning_errors_selected, positioning_errors_variants,
 without_worst_points, inversions, tolerance_study, query_cost, workspace, measured_errors,
-measured_reference_errors, adaptation, calibration, mesh_study, training, training_race, size_rules
-and size_selection/ (CSV and Markdown), errors.csv with every test condition of every method,
+measured_reference_errors, measured_points, error_budget, measured_predictions, identified_offsets,
+adaptation, calibration, mesh_study, training, training_race, size_rules and size_selection/ (CSV
+and Markdown), errors.csv with every test condition of every method, adapted_strokes.csv,
 metrics.json, figures/ and README.md.
 """
 
@@ -18,17 +19,27 @@ from flexik.datasets.crane.evaluations import TOLERANCE_FIELDS, read_evaluation
 from flexik.datasets.crane.grid import FIELDS
 from flexik.datasets.crane.learning import FITTING_FIELDS
 from flexik.datasets.crane.provenance import (
+    adaptation_checksum,
+    budget_checksum,
+    campaign_checksum,
     evaluation_checksum,
     fitting_checksum,
     grid_checksum,
-    measured_checksum,
+    identification_checksum,
     network_checksum,
     query_checksum,
     selection_checksum,
     tolerance_checksum,
     workspace_checksum,
 )
-from flexik.datasets.crane_measured.fields import ADAPTATION_FIELDS, MEASURED_FIELDS
+from flexik.datasets.crane_measured.fields import (
+    ADAPTATION_FIELDS,
+    BUDGET_FIELDS,
+    COMMAND_FIELDS,
+    MEASURED_FIELDS,
+    OFFSET_FIELDS,
+    PREDICTION_FIELDS,
+)
 from flexik.datasets.tables import read_csv, read_table
 from flexik.errors import DataError
 from flexik.files import read_json
@@ -141,19 +152,23 @@ def query_times(crane: parameters.Crane) -> pd.DataFrame:
 
 
 def measured(crane: parameters.Crane, stiffness: float) -> Measured:
-    """Campaign and adaptation."""
-    made_with = measured_checksum(crane, stiffness)
-    return Measured(
-        crane.measured,
-        read_table(DATA / "measured.parquet", MEASURED_FIELDS, made_with),
-        read_table(DATA / "adaptation.parquet", ADAPTATION_FIELDS, made_with),
-        {
-            name: read_csv(
-                REFERENCE / f"{name}.csv", PUBLISHED_COLUMNS, ("statistic",), ("statistic",)
-            )
-            for name in ("measured_errors", "measured_reference_errors")
-        },
-    )
+    """Campaign, what is identified from it, and studies on cranes as built."""
+    identified = identification_checksum(crane, stiffness)
+    found = {}
+    for name, path, fields, made_with in (
+        ("campaign", "measured", MEASURED_FIELDS, campaign_checksum(crane, stiffness)),
+        ("budget", "error_budget", BUDGET_FIELDS, budget_checksum(crane, stiffness)),
+        ("adaptation", "adaptation", ADAPTATION_FIELDS, adaptation_checksum(crane, stiffness)),
+        ("offsets", "identified/offsets", OFFSET_FIELDS, identified),
+        ("predictions", "identified/predictions", PREDICTION_FIELDS, identified),
+        ("commands", "identified/commands", COMMAND_FIELDS, identified),
+    ):
+        found[name] = read_table(DATA / f"{path}.parquet", fields, made_with)
+    tables = {
+        name: read_csv(REFERENCE / f"{name}.csv", PUBLISHED_COLUMNS, ("statistic",), ("statistic",))
+        for name in ("measured_errors", "measured_reference_errors")
+    }
+    return Measured(crane.measured, published=tables, **found)
 
 
 def published() -> Published:

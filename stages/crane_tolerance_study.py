@@ -13,17 +13,17 @@ import pandas as pd
 
 from flexik import parameters, stage
 from flexik.datasets.crane.evaluations import TOLERANCE_FIELDS
-from flexik.datasets.crane.provenance import network_checksum, tolerance_checksum
+from flexik.datasets.crane.provenance import tolerance_checksum
 from flexik.datasets.tables import write_table
 from flexik.evaluation.conditions import all_conditions
 from flexik.evaluation.tolerance import tolerance_study
-from flexik.learning.storage import load_network
 from flexik.mechanisms.crane import CraneGeometry
 from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
 from flexik.multibody.crane.model import tips
 from flexik.parameters import load_parameters
 from flexik.positioning.crane.assembly import crane_method
 from flexik.positioning.crane.initial import initial_positions
+from flexik.positioning.crane.trained import trained_network
 from flexik.positioning.method import Method, Network
 
 FOLDER = Path("data/crane")
@@ -39,8 +39,7 @@ def main() -> None:
     studies = []
     for label in crane.tolerance_study.methods:
         method = crane.methods[label]
-        path = FOLDER / "networks" / f"{method.network}.json"
-        network, _ = load_network(path, network_checksum(crane, stiffness, method.network))
+        network = trained_network(crane, method.network, stiffness, FOLDER / "networks")
         study = tolerance_study(
             functools.partial(with_tolerance, method, model.geometry, network),
             crane.tolerance_study.tolerances,

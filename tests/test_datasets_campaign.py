@@ -97,7 +97,7 @@ MISTAKES = {
     "decimal comma": ("3.795", "3,795", 4, "expected 6 cells separated by commas, as in line 2"),
     "negative load": (",86,3.791", ",-86,3.791", 7, "column payload_kg: expected 0 to 100000 kg"),
     "millimetres": ("3.795", "3795", 4, "column measured_x_m: expected -50 to 50 m, got 3795"),
-    "far away": ("3.795", "8.795", 4, "within 1 m of its target, got one 5 m away"),
+    "far away": ("3.795", "8.795", 4, "within 0.5 m of its target, got one 5 m away"),
     "method": ("none,3.8,0.15,86", "None,3.8,0.15,86", 7, "['none', 'combined'], got 'None'"),
     "twice": ("none,3.8,0.15,86", "none,3.8,0.15,0", 7, "payload are those of line 4"),
     "no counterpart": ("none,3.8,0.15,86", "none,3.8,0.15,172", 7, "172 kg and method 'combined'"),

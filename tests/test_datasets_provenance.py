@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from flexik.datasets.crane.provenance import (
+    adaptation_checksum,
+    budget_checksum,
+    campaign_checksum,
     evaluation_checksum,
     fitting_checksum,
     grid_checksum,
-    measured_checksum,
+    identification_checksum,
     network_checksum,
     selection_checksum,
     targets_checksum,
@@ -24,7 +27,9 @@ SPRING = 8e6  # N m/rad
 
 # Keys of params.yaml changed one at a time, and the checksums each must change
 GRID, SELECTION, TARGETS = "grid", "selection", "targets"
-FITTING, TOLERANCES, MEASURED, NONE = "fitting", "tolerances", "measured", "none"
+FITTING, TOLERANCES, NONE = "fitting", "tolerances", "none"
+CAMPAIGN, BUDGET, IDENTIFIED, ADAPTED = "campaign", "budget", "identified", "adapted"
+MEASURED = {CAMPAIGN, BUDGET, IDENTIFIED, ADAPTED}
 FIXED = {f"network {name}" for name in ("deflection", "direct", "rigid", "inverse", "modular")}
 CHOSEN = {f"{name}_selected" for name in FIXED}
 
@@ -53,7 +58,11 @@ def users(trainer):
 def judged(*labels):
     """What two checksums stand for: the test conditions and the workspace."""
     found = {f"{place} {label}" for place in ("evaluation", "workspace") for label in labels}
-    return found | {MEASURED} if {"combined", "combined_selected"} & set(labels) else found
+    if "combined" in labels:
+        found |= MEASURED
+    if "combined_selected" in labels:  # what is adapted
+        found |= {IDENTIFIED, ADAPTED}
+    return found
 
 
 def trained(*names):
@@ -66,9 +75,9 @@ def trained(*names):
 NETWORKS = FIXED | CHOSEN
 METHODS = judged(*BUILT_FROM)
 EVALUATIONS = {name for name in METHODS | judged(NONE) if name.startswith("evaluation ")}
-WORKSPACES = (METHODS | judged(NONE)) - EVALUATIONS - {MEASURED}
+WORKSPACES = (METHODS | judged(NONE)) - EVALUATIONS - MEASURED
 STUDIES = {FITTING, TOLERANCES}
-EVERYTHING = {GRID, SELECTION, TARGETS, MEASURED} | NETWORKS | EVALUATIONS | WORKSPACES | STUDIES
+EVERYTHING = {GRID, SELECTION, TARGETS} | MEASURED | NETWORKS | EVALUATIONS | WORKSPACES | STUDIES
 COVERED = {
     "geometry.rocker_length": EVERYTHING,
     "structure.gravity": EVERYTHING,
@@ -100,8 +109,14 @@ COVERED = {
     "methods.direct.inversion.learning_rate": judged("direct") | {TOLERANCES},
     "methods.modular_gauss_newton.inversion.damping": judged("modular_gauss_newton"),
     "tolerance_study.tolerances.1": {TOLERANCES},
-    "measured.seed": {MEASURED},
-    "measured.adaptation.n_targets": {MEASURED},
+    "measured.seed": {CAMPAIGN, BUDGET, IDENTIFIED},
+    "measured.payloads.2": {CAMPAIGN, BUDGET, IDENTIFIED},
+    "measured.noise": MEASURED,
+    "measured.deviations.play": MEASURED,
+    "measured.budget.n_cranes": {BUDGET},
+    "measured.adaptation.n_targets": {ADAPTED},
+    "measured.adaptation.n_corrections": {IDENTIFIED, ADAPTED},
+    "measured.adaptation.expected.play": {IDENTIFIED, ADAPTED},
     "calibration.stiffness_range.0": set(),
     "mesh_study.seed": set(),
     "illustration.payload": set(),
@@ -117,7 +132,10 @@ def checksums(data, spring=SPRING):
         TARGETS: targets_checksum(crane, spring),
         FITTING: fitting_checksum(crane, spring),
         TOLERANCES: tolerance_checksum(crane, spring),
-        MEASURED: measured_checksum(crane, spring),
+        CAMPAIGN: campaign_checksum(crane, spring),
+        BUDGET: budget_checksum(crane, spring),
+        IDENTIFIED: identification_checksum(crane, spring),
+        ADAPTED: adaptation_checksum(crane, spring),
         **{f"network {name}": network_checksum(crane, spring, name) for name in crane.all_networks},
         **{
             f"{place} {label}": made_with(crane, spring, label)

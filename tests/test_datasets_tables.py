@@ -169,6 +169,17 @@ def test_a_truncated_file_never_reads(whole, data):
         read_table(path, FIELDS, CHECKSUM)
 
 
+def test_a_changed_number_of_rows_is_noticed(whole):
+    path, content, _ = whole
+    # the 60 rows as a Thrift integer: of the columns, of the row group and of the file
+    places = [k for k in range(len(content)) if content[k : k + 2] == b"\x16x"]
+    assert len(places) >= 5
+    for place in places:
+        path.write_bytes(content[: place + 1] + b"p" + content[place + 2 :])
+        with pytest.raises(DataError, match=r"damaged\.parquet"):
+            read_table(path, FIELDS, CHECKSUM)
+
+
 @given(data=st.data())
 @settings(max_examples=300, deadline=None)
 def test_a_changed_byte_is_noticed_or_harmless(whole, data):

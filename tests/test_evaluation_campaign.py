@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from flexik.errors import DataError
 from flexik.evaluation.crane_measured.campaign import (
-    adaptation_statistics,
     campaign_errors,
     campaign_table,
     reference_errors,
@@ -139,25 +138,6 @@ def test_published_means_over_all_are_those_by_payload():
             # 28.8 beside 28.9 mm, a slip of the thesis
             np.testing.assert_allclose(single.max(axis=1)[largest], whole[largest], atol=0.101)
             assert whole["max_error"] > whole["mean_error"]
-
-
-def test_adaptation_statistics_are_by_twin():
-    errors = pd.DataFrame(
-        {
-            "n_measurements": np.repeat([0, 9], 42),
-            "twin": np.tile(np.repeat([5, 3], 21), 2),
-            "error": np.concatenate([k * np.arange(21.0) for k in (4, 3, 2, 1)]),
-        }
-    )
-    table = adaptation_statistics(errors.sample(frac=1, random_state=1))
-    assert table["n_measurements"].tolist() == [0, 0, 9, 9]
-    assert table["twin"].tolist() == [3, 5, 3, 5]
-    np.testing.assert_allclose(table["mean_error"], [30, 40, 10, 20])
-    np.testing.assert_allclose(table["p95_error"], [57, 76, 19, 38])
-    with pytest.raises(DataError, match="every number of every twin"):
-        adaptation_statistics(errors.iloc[:63])
-    with pytest.raises(DataError, match="every number of every twin"):
-        adaptation_statistics(errors.iloc[:0])
 
 
 def without_reference(frames):

@@ -49,7 +49,8 @@ def test_an_edited_method_is_all_that_is_computed_again(copy):
     assert done.returncode == 0, done.stdout + done.stderr
     again = {
         *("validate", "crane_evaluate@combined", "crane_tolerance_study"),
-        *("crane_measured", "crane_adaptation", "crane_report"),
+        *("crane_measured", "crane_error_budget", "crane_identify", "crane_adaptation"),
+        "crane_report",
     }
     assert stages_run(done) == {*again, "readme"}
     after = snapshot(copy)
@@ -68,7 +69,8 @@ def test_another_trainer_of_a_network_is_followed_by_what_uses_the_network(copy)
     assert stages_run(done) - {"readme"} == {
         *("validate", "crane_train_modular@modular", "crane_tolerance_study", "crane_report"),
         *("crane_evaluate@modular", "crane_evaluate@modular_gauss_newton"),
-        *("crane_measured", "crane_adaptation"),  # any network
+        # any network
+        *("crane_measured", "crane_error_budget", "crane_identify", "crane_adaptation"),
     }
     after = snapshot(copy)
     for name in ("rigid", "modular_selected"):
@@ -115,7 +117,13 @@ WATCHING = [
         {"methods__direct__inversion__n_iterations": 501},
         {"crane_evaluate@direct", "crane_tolerance_study"},
     ),
-    ({"measured__seed": 2}, {"crane_measured", "crane_adaptation"}),
+    (
+        {"measured__seed": 2},
+        {"crane_measured", "crane_error_budget", "crane_identify"},
+    ),
+    ({"measured__source": "file"}, {"crane_measured", "crane_identify"}),
+    ({"measured__budget__factor": 2.0}, {"crane_error_budget"}),
+    ({"measured__adaptation__n_targets": 6}, {"crane_adaptation"}),
     ({"tolerance_study__tolerances": [1.0e-5]}, {"crane_tolerance_study"}),
     (
         {"evaluation__payloads": [120.0, 310.0]},

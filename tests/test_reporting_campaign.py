@@ -40,15 +40,18 @@ def frames():
 
 @pytest.fixture
 def statistics():
-    """Two twins, twice as bad the second; errors fall with 1 + N."""
-    numbers = np.repeat([0, 3, 9], 2)
-    mean = 0.006 * np.tile([1.0, 2.0], 3) / (1 + numbers)
+    """Two twins, twice as bad the second; errors fall with 1 + N, by half if misjudged."""
+    numbers = np.repeat([0, 3, 9, 3, 9], 2)
+    mean = 0.006 * np.tile([1.0, 2.0], 5) / (1 + numbers)
+    mean[6:] *= 2
     return pd.DataFrame(
         {
+            "method": np.repeat(["combined", "adapted", "misjudged"], [2, 4, 4]),
             "n_measurements": numbers,
-            "twin": np.tile([0, 1], 3),
+            "twin": np.tile([0, 1], 5),
             "mean_error": mean,
             "p95_error": 3 * mean,
+            "max_error": 4 * mean,
         }
     )
 
@@ -122,6 +125,8 @@ def test_adaptation_shows_mean_and_band_of_the_twins(statistics):
         curve = next(line for line in axes.lines if line.get_marker() == "o")
         np.testing.assert_allclose(curve.get_xdata(), [0, 3, 9])
         np.testing.assert_allclose(curve.get_ydata(), factor * np.array([9, 2.25, 0.9]))
+        dashed = next(line for line in axes.lines if line.get_linestyle() == "--")
+        np.testing.assert_allclose(dashed.get_ydata(), factor * np.array([9, 4.5, 1.8]))
         (band,) = axes.collections
         edge = band.get_paths()[0].vertices
         for x, mean in zip([0, 3, 9], [9, 2.25, 0.9], strict=True):
@@ -223,6 +228,7 @@ def test_other_payloads_have_nothing_published(frames):
     assert {"43 kg", "43 kg published", "86 kg published"} <= set(table.columns)
     assert table["43 kg published"].isna().all()
     assert table["86 kg published"].notna().all()
+    assert table["all published"].isna().all()
     with pytest.raises(DataError, match="published measured errors: expected"):
         campaign_tables.measured_errors_table(
             campaign_table(other), published("measured_errors").iloc[1:]
@@ -232,10 +238,12 @@ def test_other_payloads_have_nothing_published(frames):
 
 def test_adaptation_table_counts_from_the_unadapted(statistics):
     table = campaign_tables.adaptation_table(statistics)
-    assert table["N"].tolist() == [0, 3, 9]
-    np.testing.assert_allclose(table["mean R (mm)"], [9, 2.25, 0.9])
-    np.testing.assert_allclose(table["95th percentile of R (mm)"], [27, 6.75, 2.7])
-    np.testing.assert_allclose(table["mean R of the worst twin (mm)"], [12, 3, 1.2])
-    np.testing.assert_allclose(table["ratio to unadapted"], [1, 0.25, 0.1])
-    with pytest.raises(DataError, match="expected N = 0"):
+    assert table["method"].tolist() == ["combined", *["adapted"] * 2, *["misjudged"] * 2]
+    assert table["N"].tolist() == [0, 3, 9, 3, 9]
+    np.testing.assert_allclose(table["mean R (mm)"], [9, 2.25, 0.9, 4.5, 1.8])
+    np.testing.assert_allclose(table["95th percentile of R (mm)"], [27, 6.75, 2.7, 13.5, 5.4])
+    np.testing.assert_allclose(table["mean R of the worst crane (mm)"], [12, 3, 1.2, 6, 2.4])
+    np.testing.assert_allclose(table["max R (mm)"], [48, 12, 4.8, 24, 9.6])
+    np.testing.assert_allclose(table["ratio to unadapted"], [1, 0.25, 0.1, 0.5, 0.2])
+    with pytest.raises(DataError, match="expected the unadapted first"):
         campaign_tables.adaptation_table(statistics[statistics["n_measurements"] > 0])

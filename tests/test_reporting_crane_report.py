@@ -66,7 +66,7 @@ def results(crane):
         operations={"inverse": 395.0},
     )
     nothing = pd.DataFrame()
-    measured = measured_report.Measured(crane.measured, nothing, nothing, {})
+    measured = measured_report.Measured(crane.measured, *[nothing] * 6, {})
     return crane_results.Results(
         crane=crane,
         spring_stiffness=8e6,

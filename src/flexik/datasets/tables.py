@@ -96,6 +96,7 @@ def read_arrow(
     """As `read_table`, but an Arrow table (the other modules of this room read it)."""
     with _open(path) as file:
         _compare_schema(path, file.schema_arrow, fields, parameters_checksum)
+        _check_counts(path, file.metadata)
         return file.read().select([field.name for field in fields])
 
 
@@ -242,6 +243,14 @@ def _open(path: Path | str) -> Iterator[pq.ParquetFile]:
     except (pa.ArrowException, OSError, ValueError) as error:
         reason = str(error).partition("\n")[0]
         raise DataError(f"{path}: expected an undamaged Parquet file, but {reason}") from error
+
+
+def _check_counts(path: Path | str, metadata: pq.FileMetaData) -> None:
+    """No checksum covers the numbers of rows, but each stands there several times."""
+    groups = [metadata.row_group(k) for k in range(metadata.num_row_groups)]
+    counts = {g.column(k).num_values - g.num_rows for g in groups for k in range(g.num_columns)}
+    if counts - {0} or sum(group.num_rows for group in groups) != metadata.num_rows:
+        raise DataError(f"{path}: expected an undamaged Parquet file, but its row counts differ")
 
 
 def _texts(metadata: Mapping[bytes, bytes] | None) -> dict[str, str]:

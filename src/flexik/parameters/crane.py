@@ -32,7 +32,8 @@ LENGTH_TOLERANCE = 1e-9
 # Prefixes of metrics, a method of its own, and names that DVC's run cache ignores
 TAKEN_NAMES = (
     *("none", "grid", "selection", "select", "workspace", "calibration"),
-    *("measured", "trainers", "methods", "inversion", "size", "nfiles"),
+    *("measured", "adapted", "misjudged"),
+    *("trainers", "methods", "inversion", "size", "nfiles"),
 )
 NETWORK_SECTIONS = (
     *("networks", "modular_networks"),

@@ -10,38 +10,43 @@ from flexik.parameters.model import (
     Model,
     Name,
     NotNegative,
-    Positive,
     Seed,
     Vector,
     check_increase,
 )
 
+# Beyond these a number is in another unit, or slipped
+Length = Annotated[float, Field(ge=0, le=0.02)]  # m
+Clearance = Annotated[float, Field(ge=0, le=0.005)]  # m
+Relative = Annotated[float, Field(ge=0, le=0.5)]
+Known = Field(gt=0)  # an expectation of zero would leave nothing to identify
+
 
 class Deviations(Model):
     """How far a crane may be off, see multibody.crane_measured.as_built.Magnitudes."""
 
-    pivot: NotNegative
-    length: NotNegative
-    play: NotNegative
-    play_spread: NotNegative
-    stroke_offset: NotNegative
-    repeatability: NotNegative
-    section: NotNegative
-    spring: NotNegative
+    pivot: Length
+    length: Length
+    play: Clearance
+    play_spread: Annotated[float, Field(ge=0, le=1)]
+    stroke_offset: Length
+    repeatability: Clearance
+    section: Relative
+    spring: Relative
 
 
 class Expected(Model):
     """What an adaptation expects before measuring, see positioning.crane_measured.adapted."""
 
-    measurement: Positive
-    repeatability: NotNegative
-    pivot: Positive
-    length: Positive
-    stroke_offset: Positive
-    play: NotNegative
-    play_deviation: Positive
-    section: Positive
-    spring: Positive
+    measurement: Annotated[Length, Known]
+    repeatability: Clearance
+    pivot: Annotated[Length, Known]
+    length: Annotated[Length, Known]
+    stroke_offset: Annotated[Length, Known]
+    play: Clearance
+    play_deviation: Annotated[Clearance, Known]
+    section: Annotated[Relative, Known]
+    spring: Annotated[Relative, Known]
 
 
 class Adaptation(Model):
@@ -49,21 +54,31 @@ class Adaptation(Model):
 
     method: Name
     n_cranes: Count
-    n_measurements: Annotated[list[Count], Field(min_length=1)]
+    n_measurements: Annotated[list[Annotated[int, Field(ge=3)]], Field(min_length=1)]
     n_targets: Count
     x: Interval
     y: Interval
     payload: tuple[NotNegative, NotNegative]
     n_corrections: Count
     expected: Expected
+    misjudged: Annotated[float, Field(gt=0, le=1)]
     seed: Seed
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        check_increase(self, "x", "y", "payload")
+        check_increase(self, "x", "y")
+        if self.payload[0] > self.payload[1]:
+            raise ValueError("payload: must not decrease")
         if self.n_measurements != sorted(set(self.n_measurements)):
             raise ValueError("n_measurements: must increase")
         return self
+
+
+class Budget(Model):
+    """Campaigns on cranes with one kind of deviation, or more of it."""
+
+    n_cranes: Count
+    factor: Annotated[float, Field(gt=1, le=10)]
 
 
 class Measured(Model):
@@ -74,9 +89,10 @@ class Measured(Model):
     method: Name
     points: Annotated[list[Vector], Field(min_length=1)]
     payloads: Annotated[list[NotNegative], Field(min_length=1)]
-    noise: NotNegative
+    noise: Length
     deviations: Deviations
     seed: Seed
+    budget: Budget
     adaptation: Adaptation
 
     @model_validator(mode="after")

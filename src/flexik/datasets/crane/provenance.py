@@ -1,5 +1,7 @@
 """Which parameters made which data: checksums that a file carries and its reader expects."""
 
+from collections.abc import Sequence
+
 from flexik import parameters
 from flexik.errors import ParameterError
 from flexik.files import checksum, file_checksum
@@ -89,20 +91,47 @@ def tolerance_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
     return checksum(*parts)
 
 
-def measured_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
-    """Checksum of everything that determines the campaign and what is learnt from measurements."""
+def campaign_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
+    """Checksum of everything that determines the measured campaign."""
     measured = crane.measured
-    sections: list[parameters.Section] = [measured]
+    if measured.source == "file":
+        return checksum(file_checksum(measured.file))
+    parts = _method_parts(crane, spring_stiffness, measured.method, [measured.deviations])
+    given = (measured.points, measured.payloads, measured.noise, measured.seed)
+    return checksum(*parts, repr(given))
+
+
+def budget_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
+    """Checksum of everything that determines what each deviation does."""
+    measured = crane.measured
+    sections = [measured.deviations, measured.budget]
     parts = _method_parts(crane, spring_stiffness, measured.method, sections)
-    parts += _method_parts(crane, spring_stiffness, measured.adaptation.method, [])
-    return checksum(*parts, file_checksum(measured.file))
+    given = (measured.points, measured.payloads, measured.noise, measured.seed)
+    return checksum(*parts, repr(given))
+
+
+def identification_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
+    """Checksum of everything that determines what is identified from the campaign."""
+    adaptation = crane.measured.adaptation
+    parts = _method_parts(crane, spring_stiffness, adaptation.method, [adaptation.expected])
+    campaign = campaign_checksum(crane, spring_stiffness)
+    return checksum(campaign, *parts, repr(adaptation.n_corrections))
+
+
+def adaptation_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
+    """Checksum of everything that determines what few measurements give on many cranes."""
+    measured = crane.measured
+    sections = [measured.deviations, measured.adaptation]
+    parts = _method_parts(crane, spring_stiffness, measured.adaptation.method, sections)
+    parts += _method_parts(crane, spring_stiffness, measured.method, [])
+    return checksum(*parts, repr(measured.noise))
 
 
 def _method_parts(
     crane: parameters.Crane,
     spring_stiffness: float,
     label: str,
-    sections: list[parameters.Section],
+    sections: Sequence[parameters.Section],
 ) -> list[str]:
     """Parts of a checksum: the flexible model, `sections`, and method `label`."""
     parts = [_model_checksum(crane, spring_stiffness), parameters_checksum(sections)]

@@ -3,15 +3,56 @@
 from flexik.datasets.crane.evaluations import CONDITION_FIELDS
 from flexik.datasets.tables import Field
 
+# Methods adapted by measurements, to right and to wrong expectations
+ADAPTED, MISJUDGED = "adapted", "misjudged"
+
+# A campaign of one's own may lack targets and methods, or strokes: NaN and no text
 MEASURED_FIELDS = (
     Field("method", "1", "none or combined", "string"),
     *CONDITION_FIELDS[1:7],
     Field("measured_x", "m", "where the tip came to rest, forward of the slew axis"),
     Field("measured_y", "m", "where the tip came to rest, above ground"),
 )
+_TWIN = Field("twin", "1", "number of the crane as built, from 0", "int64")
+BUDGET_FIELDS = (
+    Field("deviation", "1", "the one that differs; all: as given", "string"),
+    Field("factor", "1", "of that deviation; 0: it stands alone, as given"),
+    _TWIN,
+    Field("method", "1", "none or combined", "string"),
+    *CONDITION_FIELDS[1:4],
+    Field("error", "m", "from the target"),
+    Field("reference_error", "m", "from the point reached with 0 kg and compensation"),
+)
 ADAPTATION_FIELDS = (
-    Field("twin", "1", "number of the crane as built, from 0", "int64"),
+    _TWIN,
+    Field("method", "1", "a method of the nominal crane, adapted or misjudged", "string"),
     Field("n_measurements", "1", "measurements learnt from; 0: not adapted", "int64"),
     *CONDITION_FIELDS[1:4],
     Field("error", "m", "distance of the tip from the target"),
+)
+OFFSET_FIELDS = (
+    Field("offset", "1", "name, see positioning.crane_measured.adapted", "string"),
+    Field("unit", "1", "of the next four", "string"),
+    Field("expected", "1", "before measuring, in its unit"),
+    Field("expected_deviation", "1", "standard deviation before measuring, in its unit"),
+    Field("identified", "1", "after measuring, in its unit"),
+    Field("deviation", "1", "standard deviation after measuring, in its unit"),
+)
+PREDICTION_FIELDS = (
+    Field("measurement", "1", "number in the campaign, from 1", "int64"),
+    Field("payload", "kg", "point mass at the tip"),
+    Field("measured_x", "m", "where the tip came to rest, forward of the slew axis"),
+    Field("measured_y", "m", "where the tip came to rest, above ground"),
+    Field("surprise", "1", "distance from the nominal prediction in expected standard deviations"),
+    Field("nominal_error", "m", "distance from the prediction of the nominal crane"),
+    Field("adapted_error", "m", "from that of a crane adapted to the other targets; NaN: too few"),
+)
+COMMAND_FIELDS = (
+    *CONDITION_FIELDS[1:4],
+    *(
+        Field(f"{method}_{stroke.name}", "m", f"{stroke.description}, method {method}")
+        for method in ("none", "nominal", "adapted")
+        for stroke in CONDITION_FIELDS[4:7]
+    ),
+    Field("status", "1", "of the adapted command, see flexik.positioning.method", "int64"),
 )

@@ -180,33 +180,6 @@ def campaign_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     return pd.DataFrame(columns, index=pd.Index(list(STATISTICS), name="statistic"))
 
 
-def adaptation_statistics(errors: pd.DataFrame) -> pd.DataFrame:
-    """Mean and 95th percentile of the error, in m, of every twin after every number of points.
-
-    Parameters
-    ----------
-    errors
-        Columns n_measurements (0: not adapted), twin and error (m), a row for every judged target.
-
-    Returns
-    -------
-    DataFrame
-        Columns n_measurements, twin, mean_error and p95_error, sorted by the first two; the
-        percentile is interpolated linearly between rows.
-
-    Raises
-    ------
-    DataError
-        If there is no row, or a twin lacks a number of measurements that another has.
-    """
-    groups = errors.groupby(["n_measurements", "twin"])["error"]
-    table = groups.agg(mean_error="mean", p95_error=lambda error: error.quantile(0.95))
-    counts = table.groupby("n_measurements").size()
-    if table.empty or (counts != errors["twin"].nunique()).any():
-        raise DataError(f"adaptation: expected every number of every twin, found {dict(counts)}")
-    return table.reset_index()
-
-
 def _check_frames(frames: Mapping[str, pd.DataFrame]) -> None:
     """Raise DataError unless METHODS met the same conditions, each once."""
     if set(frames) != set(METHODS):

@@ -12,6 +12,7 @@ import numpy as np
 
 from flexik.errors import ParameterError, SolverError
 from flexik.mechanisms.crane import CraneGeometry, check_assembly
+from flexik.mechanisms.crane_dimensions import LENGTHS, VECTORS, corrected
 from flexik.multibody.beams import Array
 from flexik.multibody.crane.model import PIVOTS, RODS, CraneModel, listed, solve
 from flexik.multibody.crane.structure import BEAMS, CraneStructure, FlexibleCrane
@@ -28,12 +29,6 @@ ENDS = {
     "rocker": ("rocker_pivot", "rocker_head"),
     "coupler": ("rocker_head", "coupler_pin"),
 }
-POINTS = (
-    *("lift_pivot", "lift_cylinder_base", "lift_cylinder_head", "jib_pivot"),
-    *("rocker_pivot", "jib_cylinder_base", "coupler_pin", "extension_start"),
-)
-LENGTHS = ("lift_cylinder_length", "jib_cylinder_length", "rocker_length", "coupler_length")
-
 # A force below this pushes no pin, N: a hundred times the residual of the solver
 FORCE_FREE = 1.0
 
@@ -104,13 +99,13 @@ def draw_twin(crane: FlexibleCrane, magnitudes: Magnitudes, seed: int) -> AsBuil
     Raises ParameterError if the linkage that was drawn does not close over its strokes.
     """
     rng = np.random.default_rng(seed)
-    points = magnitudes.pivot * rng.standard_normal((len(POINTS), 2))
+    points = magnitudes.pivot * rng.standard_normal((len(VECTORS), 2))
     lengths = magnitudes.length * rng.standard_normal(len(LENGTHS))
     clearance = magnitudes.play * np.exp(magnitudes.play_spread * rng.standard_normal(len(PINS)))
     stroke_offset = magnitudes.stroke_offset * rng.standard_normal(3)
     sections = np.exp(magnitudes.section * rng.standard_normal(len(BEAMS)))
     spring = float(np.exp(magnitudes.spring * rng.standard_normal()))
-    geometry = _moved(crane.geometry, points, lengths)
+    geometry = corrected(crane.geometry, np.concatenate([points.ravel(), lengths]))
     try:
         check_assembly(geometry)
     except ParameterError as error:
@@ -227,16 +222,6 @@ def _hung(clearance: float, hangs: Array, force: Array) -> Array:
     """
     size = float(np.hypot(*force))
     return hangs if size < FORCE_FREE else -clearance / size * force
-
-
-def _moved(geometry: CraneGeometry, points: Array, lengths: Array) -> CraneGeometry:
-    changed: dict[str, tuple[float, float] | float] = {}
-    for name, (x, y) in zip(POINTS, points.tolist(), strict=True):
-        there = getattr(geometry, name)
-        changed[name] = (there[0] + x, there[1] + y)
-    for name, longer in zip(LENGTHS, lengths.tolist(), strict=True):
-        changed[name] = getattr(geometry, name) + longer
-    return replace(geometry, **changed)  # type: ignore[arg-type]
 
 
 def _stiffened(

@@ -13,18 +13,13 @@ import numpy as np
 
 from flexik.errors import ParameterError
 from flexik.mechanisms.crane import CraneGeometry, forward
+from flexik.mechanisms.crane_dimensions import DIMENSIONS, LENGTHS, corrected
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning.combined import Combined
 from flexik.positioning.crane.closed_form import closed_form
 from flexik.positioning.crane_measured.joint_play import JOINTS, compliance
 from flexik.positioning.method import Array, Command, Network, PositioningError, checked
 
-VECTORS = (
-    *("lift_pivot", "lift_cylinder_base", "lift_cylinder_head", "jib_pivot"),
-    *("rocker_pivot", "jib_cylinder_base", "coupler_pin", "extension_start"),
-)
-LENGTHS = ("lift_cylinder_length", "jib_cylinder_length", "rocker_length", "coupler_length")
-DIMENSIONS = (*(f"{name}_{axis}" for name in VECTORS for axis in "xy"), *LENGTHS)
 PLAYS = tuple(f"play_{joint}" for joint in JOINTS)
 FACTORS = ("deflection", "spring")
 OFFSETS = (*DIMENSIONS, *PLAYS, *FACTORS)
@@ -89,6 +84,12 @@ class AdaptationSettings:
                     f"adaptation: {field.name}={value}, expected a positive number"
                 )
 
+    def misjudged(self, share: float) -> "AdaptationSettings":
+        """What one expects who takes a crane for newer: no play, `share` of every deviation."""
+        names = ("pivot", "length", "stroke_offset", "play_deviation", "section", "spring")
+        smaller = {name: share * getattr(self, name) for name in names}
+        return replace(self, play=0.0, **smaller)
+
 
 @dataclass(frozen=True)
 class Offsets:
@@ -123,7 +124,7 @@ def identify(
         Naming the row whose strokes some crane near the nominal one cannot take.
     """
     _closed_tip(crane.geometry, measurements.strokes)
-    offsets, _ = _prior(settings)
+    offsets, _ = prior(settings)
     for _ in range(N_ROUNDS):
         offsets, left = _most_probable(crane, network, measurements, settings, offsets)
     return Offsets(
@@ -132,16 +133,43 @@ def identify(
     )
 
 
-def corrected(geometry: CraneGeometry, dimensions: Array) -> CraneGeometry:
-    """`geometry` with the offsets `dimensions` (20,) of DIMENSIONS, in m, added."""
-    vectors = dimensions[: 2 * len(VECTORS)].reshape(-1, 2).tolist()
-    changed: dict = {}
-    for name, (x, y) in zip(VECTORS, vectors, strict=True):
-        nominal = getattr(geometry, name)
-        changed[name] = (nominal[0] + x, nominal[1] + y)
-    for name, offset in zip(LENGTHS, dimensions[2 * len(VECTORS) :].tolist(), strict=True):
-        changed[name] = getattr(geometry, name) + offset
-    return replace(geometry, **changed)
+def predicted_tip(
+    crane: FlexibleCrane,
+    network: Network,
+    offsets: Offsets | None,
+    strokes: Array,
+    payload: Array,
+) -> Array:
+    """Tip (n, 2) in m at `strokes` (n, 3) in m under `payload` (n,) in kg.
+
+    offsets : of the nominal `crane` whose deflection `network` predicts; None: there are none.
+    """
+    inputs = np.column_stack([strokes, payload])
+    if offsets is None:
+        return forward(crane.geometry, strokes) + network.predict(inputs)
+    deflection = CorrectedDeflection(crane, network, offsets).predict(inputs)
+    return forward(offsets.geometry(crane.geometry), strokes) + deflection
+
+
+def surprise(
+    crane: FlexibleCrane, network: Network, measurements: Measurements, settings: AdaptationSettings
+) -> Array:
+    """Distance (n,) of each measured tip from what was expected, in standard deviations.
+
+    Expected is the nominal `crane` with the usual play; the covariance is that of the offsets, of
+    measuring and of repeatability. So a slip of the pen shows before anything is identified.
+    """
+    expected, deviation = prior(settings)
+    n_dimensions = len(DIMENSIONS)
+    tip = _closed_tip(crane.geometry, measurements.strokes)
+    share, fixed = _displacements(crane, network, measurements.strokes, measurements.payload)
+    residual = measurements.tip - tip - fixed - share @ expected[n_dimensions:]
+    slope = _slope(crane.geometry, expected[:n_dimensions], measurements.strokes)
+    whitening = _whitening(crane, measurements, settings)
+    spread = whitening @ np.concatenate([slope, share], axis=2) * deviation
+    covariance = spread @ spread.transpose(0, 2, 1) + np.eye(2)
+    white = (whitening @ residual[..., None])[..., 0]
+    return np.sqrt(np.einsum("ni,nij,nj->n", white, np.linalg.inv(covariance), white))
 
 
 @dataclass(frozen=True)
@@ -182,7 +210,7 @@ class Adapted:
         return Combined(inverse, deflection, self.n_corrections)(targets, payload, initial_strokes)
 
 
-def _prior(settings: AdaptationSettings) -> tuple[Array, Array]:
+def prior(settings: AdaptationSettings) -> tuple[Array, Array]:
     """Expected offsets and their standard deviations, (n_offsets,) each."""
     deviation = dict.fromkeys(OFFSETS, settings.pivot)
     deviation |= dict.fromkeys(LENGTHS, settings.length)
@@ -203,7 +231,7 @@ def _most_probable(
     start: Array,
 ) -> tuple[Array, Array]:
     """Offsets and deviations, (n_offsets,) each, with the joint forces of the offsets `start`."""
-    expected, deviation = _prior(settings)
+    expected, deviation = prior(settings)
     strokes, n_dimensions = measurements.strokes, len(DIMENSIONS)
     known = replace(crane, geometry=corrected(crane.geometry, start[:n_dimensions]))
     share, fixed = _displacements(known, network, strokes, measurements.payload)

@@ -14,6 +14,7 @@ from matplotlib.ticker import LogLocator
 from numpy.typing import ArrayLike, NDArray
 
 from flexik.datasets.crane_measured.campaign import METHODS
+from flexik.datasets.crane_measured.fields import ADAPTED, MISJUDGED
 from flexik.errors import DataError
 from flexik.evaluation.crane_measured.campaign import KEYS
 from flexik.mechanisms.crane import CraneGeometry, inverse_with_smallest_extension
@@ -121,9 +122,9 @@ def adaptation(
     path
         PNG to write.
     table
-        Columns n_measurements (0: not adapted), twin, mean_error and p95_error (m), as
-        evaluation.crane_measured.campaign.adaptation_statistics makes them. The line is the mean
-        over the twins, the band reaches from the best twin to the worst.
+        As evaluation.crane_measured.statistics.adaptation_statistics makes it. The lines are means
+        over the twins, the band of `adapted` reaches from the best twin to the worst. N = 0 is the
+        first method, which is adapted.
     goals
         Mean error (m) to fall below, by number of measurements.
 
@@ -327,11 +328,14 @@ def _legend_of_achieved(figure: Figure, colours: Colours) -> None:
 
 
 def _figure_adaptation(table: pd.DataFrame, goals: dict[int, float]) -> Figure:
-    style.require("adaptation", table.columns, ("n_measurements", *ADAPTATION_COLUMNS))
+    style.require("adaptation", table.columns, ("method", "n_measurements", *ADAPTATION_COLUMNS))
     for name in ADAPTATION_COLUMNS:
         if table.empty or not ((table[name] > 0) & np.isfinite(table[name])).all():
             raise DataError(f"adaptation: {name} must be positive and finite")
-    groups = table.groupby("n_measurements")
+    first = table["method"] == table["method"].iloc[0]
+    table_of = {name: table[first | (table["method"] == name)] for name in (ADAPTED, MISJUDGED)}
+    groups = table_of[ADAPTED].groupby("n_measurements")
+    misjudged = table_of[MISJUDGED].groupby("n_measurements")
     numbers = np.unique(table["n_measurements"]).astype(float)
     figure = Figure(figsize=(style.WIDTH, 4.4))
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -341,6 +345,7 @@ def _figure_adaptation(table: pd.DataFrame, goals: dict[int, float]) -> Figure:
             numbers, errors["min"], errors["max"], color=style.SKY, alpha=0.3, linewidth=0
         )
         axes.plot(numbers, errors["mean"], "o-", color=style.BLUE, markersize=4.5)
+        axes.plot(numbers, MM * misjudged[name].mean(), "--", color=style.GREY, linewidth=1.2)
         for x, y in zip(numbers, errors["mean"], strict=True):
             axes.annotate(
                 f"{y:.1f}",
@@ -369,8 +374,9 @@ def _figure_adaptation(table: pd.DataFrame, goals: dict[int, float]) -> Figure:
 
 def _legend_of_adaptation(figure: Figure, goals: bool) -> None:
     handles: dict[str, Line2D | Patch] = {
-        "mean over the twins": Line2D([], [], color=style.BLUE, marker="o", markersize=4.5),
-        "from the best twin to the worst": Patch(color=style.SKY, alpha=0.3),
+        "mean over the cranes": Line2D([], [], color=style.BLUE, marker="o", markersize=4.5),
+        "from the best crane to the worst": Patch(color=style.SKY, alpha=0.3),
+        "mean, misjudged": Line2D([], [], color=style.GREY, linestyle="--", linewidth=1.2),
     }
     if goals:
         handles["goal"] = Line2D(

@@ -7,17 +7,24 @@ import numpy as np
 import pandas as pd
 
 from flexik import parameters
-from flexik.datasets.crane.grid import STROKES
+from flexik.datasets.crane_measured.campaign import TARGET
+from flexik.datasets.crane_measured.fields import MISJUDGED
 from flexik.evaluation.crane_measured.campaign import (
-    adaptation_statistics,
     campaign_table,
     reference_errors,
     split_campaign,
 )
+from flexik.evaluation.crane_measured.statistics import adaptation_statistics, budget_statistics
+from flexik.mechanisms.crane import inverse_with_smallest_extension
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning.crane_measured.joint_play import joint_forces
 from flexik.reporting import page, style, tables
-from flexik.reporting.crane_measured import campaign_figures, campaign_tables
+from flexik.reporting.crane_measured import (
+    campaign_figures,
+    campaign_tables,
+    deviations,
+    identification,
+)
 
 CAPTIONS = {
     "measured_errors": "Measured positioning errors from the target (after table 4.2), mm.",
@@ -26,26 +33,44 @@ CAPTIONS = {
 }
 # Goals: after so many measurements, a share of the error of the unadapted, or m
 HALVES, GOOD, GOOD_ERROR = 9, 30, 2e-3
+# Figures of tables 4.2 and 4.3
+NAMED_POINTS = np.array([[3.8, 0.15], [3.8, 0.95]])
 
 
 @dataclass(frozen=True)
 class Measured:
-    """Campaign and adaptation; SI units.
+    """Campaign, what is identified from it, and studies on cranes as built; SI units.
 
     parameters : section crane.measured.
-    campaign : MEASURED_FIELDS of datasets.crane_measured.fields.
-    adaptation : ADAPTATION_FIELDS of datasets.crane_measured.fields.
+    campaign, budget, adaptation, offsets, predictions, commands : tables with MEASURED_FIELDS,
+        BUDGET_FIELDS and so on of datasets.crane_measured.fields.
     published : statistics (mm) by name of CAPTIONS.
     """
 
     parameters: parameters.Measured
     campaign: pd.DataFrame
+    budget: pd.DataFrame
     adaptation: pd.DataFrame
+    offsets: pd.DataFrame
+    predictions: pd.DataFrame
+    commands: pd.DataFrame
     published: dict[str, pd.DataFrame]
+
+    @property
+    def has_targets(self) -> bool:
+        """Whether the campaign tells its targets, as tables of errors need."""
+        return bool(self.campaign[TARGET].notna().all(axis=None))
+
+    @property
+    def as_built(self) -> bool:
+        """Whether a crane as built stands in for a real one."""
+        return self.parameters.source == "as_built"
 
     @property
     def tables(self) -> dict[str, pd.DataFrame]:
         """Results of evaluation.crane_measured.campaign.campaign_table by name of CAPTIONS."""
+        if not self.has_targets:
+            return {}
         frames = split_campaign(self.campaign)
         return {
             "measured_errors": campaign_table(frames),
@@ -54,100 +79,124 @@ class Measured:
 
 
 def metrics(measured: Measured) -> dict[str, float]:
-    """Mean errors over all points and payloads, and over all cranes, in mm."""
+    """Mean errors of the campaign, and over all cranes, in mm."""
     found: dict[str, float] = {}
     names = {"measured_errors": "measured", "measured_reference_errors": "measured.reference"}
     for table, values in measured.tables.items():
         for method in ("none", "combined"):
-            mean = float(values[f"{method}_all"]["mean_error"])
-            found[f"{names[table]}.{method}.mean_error_mm"] = round(mean, 4)
-    by_crane = adaptation_statistics(measured.adaptation).groupby("n_measurements")
-    for n, row in by_crane[["mean_error", "p95_error"]].mean().iterrows():
+            found[f"{names[table]}.{method}.mean_error_mm"] = float(
+                values[f"{method}_all"]["mean_error"]
+            )
+    means = budget_statistics(measured.budget)
+    means = means[means["deviation"] == "all"]
+    for method in ("none", "combined"):
+        for end, label in (("", method), ("_reference", f"reference.{method}")):
+            mean = style.MM * means[f"{method}{end}"].mean()
+            found[f"measured.cranes.{label}.mean_error_mm"] = mean
+    statistics = adaptation_statistics(measured.adaptation)
+    by_method = statistics.groupby(["method", "n_measurements"])[["mean_error", "p95_error"]].mean()
+    for row in by_method.reset_index().to_dict("records"):
+        label, n = row["method"], row["n_measurements"]
+        prefix = f"measured.{label}_{n}" if n else f"measured.unadapted.{label}"
         for name in ("mean_error", "p95_error"):
-            found[f"measured.adapted_{n}.{name}_mm"] = round(style.MM * row[name], 4)
-    return found
-
-
-def pushes(measured: Measured, crane: FlexibleCrane) -> pd.DataFrame:
-    """Rows of the campaign without compensation, and whether the jib cylinder `pushes` there.
-
-    By statics of the rigid nominal crane.
-    """
-    rows = measured.campaign[measured.campaign["method"] == "none"]
-    load = np.zeros((len(rows), 2))
-    load[:, 1] = -crane.structure.gravity * rows["payload"]
-    strokes = rows[list(STROKES)].to_numpy()
-    force = joint_forces(crane, strokes, load, crane.structure.gravity).joints["jib_cylinder"]
-    return rows.assign(pushes=force[:, 0] < 0.0)
-
-
-def point_notes(measured: Measured, crane: FlexibleCrane) -> list[str]:
-    """Where the jib force changes its direction, and where compensation does not help."""
-    frames = split_campaign(measured.campaign)
-    push, notes = pushes(measured, crane), []
-    points = frames["none"].drop_duplicates("point")
-    changing, worse = [], []
-    for _, row in points.iterrows():
-        number = int(row["point"]) + 1
-        same = (push["target_x"] == row["target_x"]) & (push["target_y"] == row["target_y"])
-        of_point = push.loc[same & push["pushes"], "payload"]
-        if len(of_point):
-            loads = ", ".join(f"{payload:g}" for payload in of_point)
-            changing.append(f"{number} (with {loads} kg)")
-        errors = [
-            frame.loc[frame["point"] == row["point"], "error"].mean() for frame in frames.values()
-        ]
-        if errors[1] > errors[0]:
-            worse.append(str(number))
-    notes.append(
-        "The jib cylinder pushes in "
-        + (f"point {', '.join(changing)}" if changing else "no point")
-        + ", elsewhere it pulls; in the thesis it pushes in points 2 and 3, which are better "
-        "without compensation. "
-        + (
-            f"Here compensation does not help in point {', '.join(worse)}."
-            if worse
-            else "Here compensation lowers the mean error of every point."
-        )
-    )
-    return notes
+            found[f"{prefix}.{name}_mm"] = style.MM * row[name]
+    if len(measured.predictions):
+        for crane in ("nominal", "adapted"):
+            error = style.MM * measured.predictions[f"{crane}_error"].mean()
+            found[f"measured.prediction.{crane}.mean_error_mm"] = error
+    return {name: round(float(value), 4) for name, value in found.items() if np.isfinite(value)}
 
 
 def write(measured: Measured, crane: FlexibleCrane, folder: Path) -> None:
-    """Write tables and figures into `folder`."""
+    """Write tables and figures into `folder`; tables that the campaign cannot give are empty."""
+    for name in CAPTIONS.keys() - measured.tables.keys():
+        _write_absent(folder / name, CAPTIONS[name])
     for name, table in measured.tables.items():
-        beside = campaign_tables.measured_errors_table(table, measured.published[name])
+        published = measured.published[name]
+        beside = campaign_tables.measured_errors_table(table, published)
         notes = []
-        if name == "measured_errors":
-            notes = [*point_notes(measured, crane), campaign_tables.PUBLISHED_NOTE]
+        if name == "measured_errors" and measured.as_built:
+            notes.append(deviations.spread_note(measured.budget))
+        if not campaign_tables.has_published_payloads(table):
+            notes.append("Other payloads than published, so nothing stands beside those over all.")
+        elif name == "measured_errors":
+            notes.append(campaign_tables.published_note(published))
         tables.write_table(folder / name, beside, 1, CAPTIONS[name], notes)
-    statistics = adaptation_statistics(measured.adaptation)
+    points = deviations.point_table(measured.budget, crane)
+    caption = "Points of params.yaml: the nominal rigid crane, and cranes as built."
+    notes = deviations.point_notes(points)
+    tables.write_table(folder / "measured_points", points, 1, caption, notes)
+    reference = measured.published["measured_reference_errors"].set_index("statistic")
+    caption = "Mean R over the points and payloads of params.yaml on cranes as built, by deviation."
+    theirs = float(reference["combined_all"]["mean_error"])
+    notes = [deviations.sensitivity_note(measured.budget, theirs)]
+    table = deviations.budget_table(measured.budget)
+    tables.write_table(folder / "error_budget", table, 1, caption, notes)
+    _write_adaptation(measured, folder)
+    _write_identification(measured, folder)
+    _write_figures(measured, crane, folder / "figures")
+
+
+def _write_adaptation(measured: Measured, folder: Path) -> None:
     settings = measured.parameters.adaptation
     caption = (
         f"Errors at {settings.n_targets} other targets on each of {settings.n_cranes} cranes as "
-        "built, after N measurements; N = 0: the compensator of the nominal crane. The percentile "
-        "is that of each crane, averaged."
+        f"built after N measurements; N = 0: methods of the nominal crane, `{settings.method}` the "
+        f"one that is adapted. `{MISJUDGED}`: adapted by one who expects no play and "
+        f"{100 * settings.misjudged:g} % of the other deviations. The percentile is that of the "
+        "targets of each crane, averaged over the cranes; max R is over everything."
     )
-    table = campaign_tables.adaptation_table(statistics)
+    table = campaign_tables.adaptation_table(adaptation_statistics(measured.adaptation))
     tables.write_table(folder / "adaptation", table, 2, caption)
-    _write_figures(measured, statistics, crane, folder / "figures")
 
 
-def _write_figures(
-    measured: Measured, statistics: pd.DataFrame, crane: FlexibleCrane, folder: Path
-) -> None:
+def _write_identification(measured: Measured, folder: Path) -> None:
+    identification.write_commands(folder / "adapted_strokes.csv", measured.commands)
+    captions = {
+        "identified_offsets": "Offsets of the nominal crane, identified from all measurements of "
+        "the campaign.",
+        "measured_predictions": "Measured points beside the predicted: distances for the nominal "
+        "crane, and for cranes adapted to the measurements of the other targets alone.",
+    }
+    if not len(measured.offsets):
+        for name, caption in captions.items():
+            _write_absent(folder / name, caption)
+        return
+    table = identification.offset_table(measured.offsets)
+    tables.write_table(folder / "identified_offsets", table, 2, captions["identified_offsets"])
+    tables.write_table(
+        folder / "measured_predictions",
+        identification.prediction_table(measured.predictions),
+        1,
+        captions["measured_predictions"],
+        identification.prediction_notes(measured.predictions),
+    )
+
+
+def _write_absent(path: Path, caption: str) -> None:
+    notes = ["The campaign does not give it."]
+    tables.write_table(path, pd.DataFrame({"statistic": []}), 1, caption, notes)
+
+
+def _write_figures(measured: Measured, crane: FlexibleCrane, folder: Path) -> None:
+    for path in folder.glob("measured_*.png"):
+        path.unlink()
+    statistics = adaptation_statistics(measured.adaptation)
+    unadapted = statistics[statistics["method"] == statistics["method"].iloc[0]]["mean_error"]
+    goals = {
+        n: goal
+        for n, goal in ((HALVES, 0.5 * unadapted.mean()), (GOOD, GOOD_ERROR))
+        if n in measured.parameters.adaptation.n_measurements
+    }
+    campaign_figures.adaptation(folder / "adaptation.png", statistics, goals)
+    if not measured.has_targets:
+        return
     frames = split_campaign(measured.campaign)
     moved = reference_errors(frames)
-    unloaded = measured.campaign[
-        (measured.campaign["method"] == "none") & (measured.campaign["payload"] == 0.0)
-    ]
-    points = unloaded[["target_x", "target_y"]].to_numpy()
-    strokes = unloaded[list(STROKES)].to_numpy()
-    by_point = pushes(measured, crane).groupby(["target_x", "target_y"], sort=False)["pushes"]
-    pushing = by_point.any().to_dict()
-    jib_pushes = [pushing[tuple(point)] for point in points]
+    points = target_points(measured)
+    strokes, pushes = jib_pushes(measured, crane)
     path = folder / "measured_points.png"
-    campaign_figures.measured_points(path, crane.geometry, strokes, points, jib_pushes)
+    campaign_figures.measured_points(path, crane.geometry, strokes, points, pushes)
     for axis in ("x", "y"):
         path = folder / f"measured_errors_{axis}.png"
         campaign_figures.errors_by_point(path, frames, axis)
@@ -155,70 +204,98 @@ def _write_figures(
         campaign_figures.errors_by_point(path, moved, axis)
     for number, target in enumerate(named_points(points), start=1):
         campaign_figures.achieved(folder / f"measured_point_{number}.png", frames, target)
-    unadapted = statistics[statistics["n_measurements"] == 0]["mean_error"].mean()
-    goals = {
-        n: goal
-        for n, goal in ((HALVES, 0.5 * unadapted), (GOOD, GOOD_ERROR))
-        if n in measured.parameters.adaptation.n_measurements
-    }
-    campaign_figures.adaptation(folder / "adaptation.png", statistics, goals)
+
+
+def jib_pushes(measured: Measured, crane: FlexibleCrane) -> tuple[np.ndarray, np.ndarray]:
+    """Strokes (k, 3) in m of the rigid inverse at the targets, and where its jib cylinder pushes.
+
+    (k,), with one of the payloads or more, by statics of the rigid nominal `crane`.
+    """
+    points = target_points(measured)
+    strokes = inverse_with_smallest_extension(crane.geometry, points).strokes
+    pushes = np.zeros(len(points), dtype=bool)
+    for payload in measured.campaign["payload"].unique():
+        load = np.tile([0.0, -crane.structure.gravity * payload], (len(points), 1))
+        force = joint_forces(crane, strokes, load, crane.structure.gravity).joints["jib_cylinder"]
+        pushes |= force[:, 0] < 0.0
+    return strokes, pushes
 
 
 def target_points(measured: Measured) -> np.ndarray:
     """Targets (k, 2) of the campaign, m, in their order."""
-    keys = ["target_x", "target_y"]
-    return measured.campaign[keys].drop_duplicates().to_numpy()
+    return measured.campaign[TARGET].drop_duplicates().to_numpy()
 
 
 def named_points(points: np.ndarray) -> np.ndarray:
     """The two points of figures 4.24 and 4.25, or the last two where those are not measured."""
-    named = np.array([[3.8, 0.15], [3.8, 0.95]])
-    there = [np.isclose(points, point).all(axis=1).any() for point in named]
-    return named if all(there) else points[-2:]
+    there = [np.isclose(points, point).all(axis=1).any() for point in NAMED_POINTS]
+    return NAMED_POINTS if all(there) else points[-2:]
 
 
 def section(measured: Measured, folder: Path) -> page.Section:
     """Part of the report page."""
-    figures = folder / "figures"
-    own = measured.parameters.source == "file"
-    source = (
-        f"The measurements are those of `{measured.parameters.file}`."
-        if own
-        else "No crane was measured here: the flexible model with hidden differences from the "
-        "nominal one (pins, lengths, joint play, stroke sensors, stiffness) stands in for it, so "
-        "single values cannot agree with the published ones, only their order and what "
-        "compensation changes."
-    )
+    texts = [_source_text(measured), _adaptation_text(measured)]
+    names = [*measured.tables, "measured_points", "error_budget"]
+    names += ["measured_predictions", "identified_offsets"] if len(measured.offsets) else []
     return page.Section(
         "Measured crane",
-        f"{source}\n\n"
-        "Adaptation, on cranes as built in the model whatever the source of the campaign: from N "
-        "measured points the most probable offsets of pins, lengths, strokes, play and stiffness "
-        "of the nominal crane are identified, and the compensator uses them. The cranes differ "
-        "from the nominal one only in such offsets, so a real crane will leave more. Before "
-        "measuring it expects `expected`, the cranes are drawn with `deviations` (params.yaml). "
-        "Errors include the repeatability of the strokes.",
-        [
-            folder / "measured_errors.md",
-            folder / "measured_reference_errors.md",
-            folder / "adaptation.md",
-        ],
-        [
-            (figures / "measured_points.png", "Measured points (after figure 4.20)."),
-            (figures / "measured_errors_x.png", "Errors in x from the target (after figure 4.22)."),
-            (figures / "measured_errors_y.png", "Errors in y from the target (after figure 4.22)."),
-            (
-                figures / "measured_reference_errors_x.png",
-                "Errors in x from the reference point (after figure 4.23).",
-            ),
-            (
-                figures / "measured_reference_errors_y.png",
-                "Errors in y from the reference point (after figure 4.23).",
-            ),
-            *(
-                (figures / f"measured_point_{number}.png", "Points reached about one target.")
-                for number in range(1, 1 + len(named_points(target_points(measured))))
-            ),
-            (figures / "adaptation.png", "Error by number of measurements."),
-        ],
+        "\n\n".join(texts),
+        [folder / f"{name}.md" for name in [*names, "adaptation"]],
+        _figures(measured, folder / "figures"),
     )
+
+
+def _source_text(measured: Measured) -> str:
+    if measured.as_built:
+        return (
+            "No crane was measured here: the flexible model with hidden differences from the "
+            "nominal one (pins, lengths, joint play, stroke sensors, stiffness) stands in for it, "
+            "so single values cannot agree with the published ones, only their order and what "
+            "compensation changes."
+        )
+    text = f"The measurements are those of `{measured.parameters.file}`."
+    if not measured.has_targets:
+        text += " It has no targets, so there are no tables of errors and no commands."
+    return text
+
+
+def _adaptation_text(measured: Measured) -> str:
+    text = (
+        "Adaptation: from measured points the most probable offsets of pins, lengths, strokes, "
+        "play and stiffness of the nominal crane are identified, and the compensator uses them. "
+        "Before measuring it expects `expected`, the cranes as built are drawn with `deviations` "
+        "(params.yaml), so they differ from the nominal one only in what is looked for, and a real "
+        "crane will leave more. Errors include the repeatability of the strokes. "
+    )
+    if not len(measured.offsets):
+        return text + "The campaign has no strokes, so nothing is identified from it."
+    if not len(measured.commands):
+        return text.rstrip()
+    return text + identification.command_text(measured.commands, "adapted_strokes.csv")
+
+
+def _figures(measured: Measured, figures: Path) -> list[tuple[Path, str]]:
+    found = [(figures / "adaptation.png", "Error by number of measurements, all cranes.")]
+    if not measured.has_targets:
+        return found
+    return [
+        (figures / "measured_points.png", "Measured points (after figure 4.20)."),
+        (figures / "measured_errors_x.png", "Errors in x from the target (after figure 4.22)."),
+        (figures / "measured_errors_y.png", "Errors in y from the target (after figure 4.22)."),
+        (
+            figures / "measured_reference_errors_x.png",
+            "Errors in x from the reference point (after figure 4.23).",
+        ),
+        (
+            figures / "measured_reference_errors_y.png",
+            "Errors in y from the reference point (after figure 4.23).",
+        ),
+        *(
+            (
+                figures / f"measured_point_{number}.png",
+                "Points reached about one target (after figures 4.24 and 4.25).",
+            )
+            for number in range(1, 1 + len(named_points(target_points(measured))))
+        ),
+        *found,
+    ]
