@@ -105,8 +105,12 @@ def errors_of(study: Study, number: int) -> pd.DataFrame:
     methods: dict[tuple[str, int], Method] = {
         (label, 0): method for label, method in study.baselines.items()
     }
-    for label, expected in ((ADAPTED, right), (MISJUDGED, right.misjudged(settings.misjudged))):
-        for n in settings.n_measurements:
+    wrong = right.misjudged(settings.misjudged.share)
+    for label, expected, numbers in (
+        (ADAPTED, right, settings.n_measurements),
+        (MISJUDGED, wrong, settings.misjudged.n_measurements),
+    ):
+        for n in numbers:
             measurements = Measurements(strokes[:n], learn.payload[:n], tip[:n])
             offsets = identify(study.nominal, study.network, measurements, expected)
             methods[label, n] = Adapted(

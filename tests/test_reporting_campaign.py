@@ -125,8 +125,9 @@ def test_adaptation_shows_mean_and_band_of_the_twins(statistics):
         curve = next(line for line in axes.lines if line.get_marker() == "o")
         np.testing.assert_allclose(curve.get_xdata(), [0, 3, 9])
         np.testing.assert_allclose(curve.get_ydata(), factor * np.array([9, 2.25, 0.9]))
-        dashed = next(line for line in axes.lines if line.get_linestyle() == "--")
-        np.testing.assert_allclose(dashed.get_ydata(), factor * np.array([9, 4.5, 1.8]))
+        squares = next(line for line in axes.lines if line.get_marker() == "s")
+        np.testing.assert_allclose(squares.get_xdata(), [3, 9])
+        np.testing.assert_allclose(squares.get_ydata(), factor * np.array([4.5, 1.8]))
         (band,) = axes.collections
         edge = band.get_paths()[0].vertices
         for x, mean in zip([0, 3, 9], [9, 2.25, 0.9], strict=True):

@@ -49,6 +49,13 @@ class Expected(Model):
     spring: Annotated[Relative, Known]
 
 
+class Misjudged(Model):
+    """An adaptation to expectations that are too small."""
+
+    share: Annotated[float, Field(gt=0, le=1)]
+    n_measurements: list[Count]
+
+
 class Adaptation(Model):
     """Cranes that are adapted, measurements for it, and targets to judge by."""
 
@@ -61,7 +68,7 @@ class Adaptation(Model):
     payload: tuple[NotNegative, NotNegative]
     n_corrections: Count
     expected: Expected
-    misjudged: Annotated[float, Field(gt=0, le=1)]
+    misjudged: Misjudged
     seed: Seed
 
     @model_validator(mode="after")
@@ -71,6 +78,9 @@ class Adaptation(Model):
             raise ValueError("payload: must not decrease")
         if self.n_measurements != sorted(set(self.n_measurements)):
             raise ValueError("n_measurements: must increase")
+        for number in self.misjudged.n_measurements:
+            if number not in self.n_measurements:
+                raise ValueError(f"misjudged.n_measurements: {number} is not in n_measurements")
         return self
 
 

@@ -34,7 +34,7 @@ def write_report(results: Results, folder: Path, published_files: list[Path]) ->
     write_tables(results, folder)
     _write_figures(results, folder / "figures")
     nominal = flexible_crane(results.crane, results.spring_stiffness)
-    measured_report.write(results.measured, nominal, folder)
+    measured_report.write(results.measured, nominal, results.crane.grid.payload.minimum, folder)
     inputs = {str(path): file_checksum(path) for path in published_files}
     for beam in BEAMS:
         path = getattr(results.crane.structure.beams, beam).section

@@ -332,10 +332,9 @@ def _figure_adaptation(table: pd.DataFrame, goals: dict[int, float]) -> Figure:
     for name in ADAPTATION_COLUMNS:
         if table.empty or not ((table[name] > 0) & np.isfinite(table[name])).all():
             raise DataError(f"adaptation: {name} must be positive and finite")
-    first = table["method"] == table["method"].iloc[0]
-    table_of = {name: table[first | (table["method"] == name)] for name in (ADAPTED, MISJUDGED)}
-    groups = table_of[ADAPTED].groupby("n_measurements")
-    misjudged = table_of[MISJUDGED].groupby("n_measurements")
+    own = table["method"].isin([table["method"].iloc[0], ADAPTED])
+    groups = table[own].groupby("n_measurements")
+    misjudged = table[table["method"] == MISJUDGED].groupby("n_measurements")
     numbers = np.unique(table["n_measurements"]).astype(float)
     figure = Figure(figsize=(style.WIDTH, 4.4))
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -345,7 +344,8 @@ def _figure_adaptation(table: pd.DataFrame, goals: dict[int, float]) -> Figure:
             numbers, errors["min"], errors["max"], color=style.SKY, alpha=0.3, linewidth=0
         )
         axes.plot(numbers, errors["mean"], "o-", color=style.BLUE, markersize=4.5)
-        axes.plot(numbers, MM * misjudged[name].mean(), "--", color=style.GREY, linewidth=1.2)
+        worse = MM * misjudged[name].mean()
+        axes.plot(worse.index, worse, "s", color=style.ORANGE, markersize=5.5, fillstyle="none")
         for x, y in zip(numbers, errors["mean"], strict=True):
             axes.annotate(
                 f"{y:.1f}",
@@ -376,7 +376,9 @@ def _legend_of_adaptation(figure: Figure, goals: bool) -> None:
     handles: dict[str, Line2D | Patch] = {
         "mean over the cranes": Line2D([], [], color=style.BLUE, marker="o", markersize=4.5),
         "from the best crane to the worst": Patch(color=style.SKY, alpha=0.3),
-        "mean, misjudged": Line2D([], [], color=style.GREY, linestyle="--", linewidth=1.2),
+        "mean, misjudged": Line2D(
+            [], [], color=style.ORANGE, marker="s", markersize=5.5, fillstyle="none", linewidth=0
+        ),
     }
     if goals:
         handles["goal"] = Line2D(

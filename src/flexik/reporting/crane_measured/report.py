@@ -107,7 +107,7 @@ def metrics(measured: Measured) -> dict[str, float]:
     return {name: round(float(value), 4) for name, value in found.items() if np.isfinite(value)}
 
 
-def write(measured: Measured, crane: FlexibleCrane, folder: Path) -> None:
+def write(measured: Measured, crane: FlexibleCrane, payload_minimum: float, folder: Path) -> None:
     """Write tables and figures into `folder`; tables that the campaign cannot give are empty."""
     for name in CAPTIONS.keys() - measured.tables.keys():
         _write_absent(folder / name, CAPTIONS[name])
@@ -125,9 +125,17 @@ def write(measured: Measured, crane: FlexibleCrane, folder: Path) -> None:
     points = deviations.point_table(measured.budget, crane)
     caption = "Points of params.yaml: the nominal rigid crane, and cranes as built."
     notes = deviations.point_notes(points)
-    tables.write_table(folder / "measured_points", points, 1, caption, notes)
+    places = {"x (m)": 2, "y (m)": 2} | {
+        name: 0 if name.endswith("(%)") else 1 for name in points.columns[3:]
+    }
+    tables.write_table(folder / "measured_points", points, places, caption, notes)
     reference = measured.published["measured_reference_errors"].set_index("statistic")
-    caption = "Mean R over the points and payloads of params.yaml on cranes as built, by deviation."
+    caption = (
+        "Mean R over the points and payloads of params.yaml on cranes as built, by deviation. "
+        "`none`: a crane without any, so the noise of measuring and the network's own error; "
+        "its training payloads begin at "
+        f"{payload_minimum:g} kg."
+    )
     theirs = float(reference["combined_all"]["mean_error"])
     notes = [deviations.sensitivity_note(measured.budget, theirs)]
     table = deviations.budget_table(measured.budget)
@@ -143,8 +151,8 @@ def _write_adaptation(measured: Measured, folder: Path) -> None:
         f"Errors at {settings.n_targets} other targets on each of {settings.n_cranes} cranes as "
         f"built after N measurements; N = 0: methods of the nominal crane, `{settings.method}` the "
         f"one that is adapted. `{MISJUDGED}`: adapted by one who expects no play and "
-        f"{100 * settings.misjudged:g} % of the other deviations. The percentile is that of the "
-        "targets of each crane, averaged over the cranes; max R is over everything."
+        f"{100 * settings.misjudged.share:g} % of the other deviations. The percentile is that of "
+        "the targets of each crane, averaged over the cranes; max R is over everything."
     )
     table = campaign_tables.adaptation_table(adaptation_statistics(measured.adaptation))
     tables.write_table(folder / "adaptation", table, 2, caption)
