@@ -151,7 +151,7 @@ def test_failures_are_told_with_their_reasons():
     status = [0, NOT_CONVERGED, ACTUATOR_LIMIT, NOT_CONVERGED]
     frames = {"none": frame([0.1] * 4), "new": frame([0.1] * 4, status)}
     assert crane_notes.failure_notes(frames) == [
-        "new: failed conditions: 3 (needs a stroke outside the cylinder: 1; search ended above its "
+        "new: failed conditions: 3 (needs an actuator beyond its limit: 1; search ended above its "
         "tolerance: 2); their errors are at the strokes where the method stopped and are included."
     ]
 
