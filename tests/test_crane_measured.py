@@ -225,7 +225,10 @@ def test_points_are_told_by_angle_force_and_share(measured, nominal):
     np.testing.assert_allclose(table["worse with (%)"], [0, 200 / 3, 0])
     np.testing.assert_allclose(table["R without (mm)"], 10.0)
     np.testing.assert_allclose(table["R with (mm)"], [2, 32 / 3, 2])
-    first, second = deviations.point_notes(table)
+    np.testing.assert_allclose(table["R with a load, from reference (mm)"], [1, 29 / 3, 1])
+    first, turned, second = deviations.point_notes(table)
+    assert "in point 2, play changes sides" in turned
+    assert "lies 9.7 mm from the point of reference, elsewhere 1.0 mm" in turned
     assert "beyond the vertical in points 1 and 2, in the thesis in points 2 and 3" in first
     assert "it pushes in point 2 (172 kg); elsewhere" in first
     assert "half of the cranes or more in point 2; there it wins -0.7 mm" in second

@@ -20,6 +20,7 @@ COLUMNS = {
     "none_reference": "without, from reference",
     "combined_reference": "with, from reference",
 }
+MOVED = "R with a load, from reference (mm)"
 NAMES = {
     "pivot": "pins",
     "length": "lengths",
@@ -88,8 +89,9 @@ def point_table(budget: pd.DataFrame, crane: FlexibleCrane) -> pd.DataFrame:
 
     Columns point (from 1), x and y in m, angle of the jib arm from the vertical in degrees
     (negative: beyond it), force of the jib cylinder in kN by payload (positive: it pulls), mean R
-    in mm without and with compensation, and the share of the cranes (%) on which compensation makes
-    the point worse, from the target and from the point of reference.
+    in mm without and with compensation, the same with compensation and a load from the point of
+    reference, and the share of the cranes (%) on which compensation makes the point worse, from the
+    target and from the point of reference.
     """
     shares = worse_shares(budget)
     points = shares[["target_x", "target_y"]].to_numpy()
@@ -113,6 +115,9 @@ def point_table(budget: pd.DataFrame, crane: FlexibleCrane) -> pd.DataFrame:
         of_method = rows[rows["method"] == method]
         error = of_method.groupby(["target_x", "target_y"], sort=False)["error"].mean()
         table[f"R {COLUMNS[method]} (mm)"] = MM * error.to_numpy()
+    loaded = rows[(rows["method"] == "combined") & (rows["payload"] > rows["payload"].min())]
+    moved = loaded.groupby(["target_x", "target_y"], sort=False)["reference_error"].mean()
+    table[MOVED] = MM * moved.to_numpy()
     table["worse with (%)"] = 100 * shares["error"]
     table["worse with, from reference (%)"] = 100 * shares["reference_error"]
     return table
@@ -133,6 +138,13 @@ def point_notes(table: pd.DataFrame) -> list[str]:
         "cylinder pushes instead of pulling. By statics of our nominal crane it pushes in "
         f"{_points(pushing)}; elsewhere the weight lies in front of the jib's pivot."
     ]
+    turns = forces.lt(0).any(axis=1) & forces.gt(0).any(axis=1)
+    if turns.any() and not turns.all():
+        notes.append(
+            f"Where the load turns that force, in {_points(table.loc[turns, 'point'])}, play changes "
+            f"sides: loaded, the compensated tip lies {table.loc[turns, MOVED].mean():.1f} mm from "
+            f"the point of reference, elsewhere {table.loc[~turns, MOVED].mean():.1f} mm."
+        )
     worse = table["worse with, from reference (%)"] >= 50.0
     note = (
         f"In the thesis compensation makes {thesis} worse. Here, from the point of reference, it "
