@@ -13,10 +13,7 @@ from scipy.spatial.transform import RigidTransform
 from flexik.errors import ParameterError
 from flexik.mechanisms.fanuc import (
     ELBOW,
-    JOINT_LIMIT,
     N_CONFIGURATIONS,
-    OUT_OF_REACH,
-    REACHED,
     SHOULDER,
     WRIST,
     canonical,
@@ -28,6 +25,7 @@ from flexik.mechanisms.fanuc import (
     wrapped,
 )
 from flexik.mechanisms.serial_arm import Pose, forward, jacobian, pose_errors
+from flexik.mechanisms.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
 
 N_ROUND_TRIP = 100_000
 
@@ -66,7 +64,7 @@ def test_every_configuration_reaches_the_pose(trip):
 def test_limits_are_applied_to_every_configuration(trip):
     _, _, found = trip
     assert ARM.within_limits(found.joints[found.reached]).all()
-    limited = found.status == JOINT_LIMIT
+    limited = found.status == ACTUATOR_LIMIT
     assert limited.any()
     assert not ARM.within_limits(found.joints[limited]).any()
     assert np.isnan(found.joints[found.status == OUT_OF_REACH]).all()
@@ -78,7 +76,7 @@ def test_wrist_configurations_are_half_turns_of_one_another(trip):
     both = found.status[:, 0] != OUT_OF_REACH
     one, other = found.joints[both, 0], found.joints[both, WRIST]
     assert np.abs(one[:, :3] - other[:, :3]).max() == 0.0
-    assert np.abs(one[:, 4] + other[:, 4]).max() < 1e-12
+    assert np.abs(wrapped(one[:, 4] + other[:, 4])).max() < 1e-12
     for joint in (3, 5):
         turned = wrapped(one[:, joint] - other[:, joint])
         assert np.abs(np.abs(turned) - np.pi).max() < 1e-9
@@ -119,7 +117,8 @@ def test_wrist_singularity_is_flagged_and_still_solved():
     for k in range(N_CONFIGURATIONS):
         rows = found.reached[:, k]
         errors = pose_errors(pose.rows(rows), forward(ARM, found.joints[rows, k]))
-        assert max(error.max() for error in errors) < 1e-9
+        # where cosines are 1 to the last digit, angles are known to half the digits
+        assert max(error.max() for error in errors) < 1e-8
 
 
 def shoulder_pose(radius):
@@ -169,7 +168,7 @@ def test_nearest_takes_the_configuration_the_arm_is_in():
 def test_nearest_says_when_a_limit_is_all_that_is_in_the_way():
     tight = dataclasses.replace(ARM, minimum=(0.1,) * 6, maximum=(0.2,) * 6)
     chosen = nearest(tight, forward(ARM, np.full((1, 6), 0.5)), np.zeros((1, 6)))
-    assert chosen.status.tolist() == [JOINT_LIMIT] and np.isnan(chosen.joints).all()
+    assert chosen.status.tolist() == [ACTUATOR_LIMIT] and np.isnan(chosen.joints).all()
 
 
 angles = st.floats(-1.0, 1.0)

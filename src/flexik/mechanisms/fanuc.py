@@ -12,18 +12,12 @@ from numpy.typing import NDArray
 
 from flexik.errors import ParameterError
 from flexik.mechanisms.serial_arm import Array, Pose, SerialArm, frames
+from flexik.mechanisms.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
 
 # Configuration number: 4 if the arm reaches back over axis 1, 2 if the elbow angle is negative, 1
 # if joint 5 is negative (the wrist flipped)
 N_CONFIGURATIONS = 8
 SHOULDER, ELBOW, WRIST = 4, 2, 1
-
-REACHED, OUT_OF_REACH, JOINT_LIMIT = 0, 1, 2
-STATUS_MEANING = {
-    REACHED: "reached",
-    OUT_OF_REACH: "wrist centre farther or nearer than the links allow",
-    JOINT_LIMIT: "needs a joint beyond its limits",
-}
 
 # A joint this far outside its limits is round-off of a pose on the border, rad
 LIMIT_TOLERANCE = 1e-9
@@ -41,8 +35,8 @@ class InverseSolution(NamedTuple):
     """Joints of every arm configuration, in the order of their number.
 
     joints : (n, 8, 6) in rad; nan where OUT_OF_REACH, the angles that would be needed where
-        JOINT_LIMIT
-    status : (n, 8), of STATUS_MEANING
+        ACTUATOR_LIMIT
+    status : (n, 8), a code of mechanisms.status
     singular : (n, 8), the arm is as good as singular there: wrist centre on axis 1, arm stretched
         or folded, or axes 4 and 6 in line; where joint 1 or 4 is free, its theta is 0
     """
@@ -122,8 +116,9 @@ def inverse(arm: SerialArm, target: Pose, near: Array | None = None) -> InverseS
                     singular[:, k] = ~missed & (at_arm | at_wrist)
                     status[missed, k] = OUT_OF_REACH
     reference = np.broadcast_to(0.0 if near is None else near, (n, 6))[:, None]
+    joints[status == OUT_OF_REACH] = np.nan
     joints, beyond = _nearest_turn(arm, joints, reference)
-    status[beyond & (status == REACHED)] = JOINT_LIMIT
+    status[beyond & (status == REACHED)] = ACTUATOR_LIMIT
     return InverseSolution(joints, status, singular)
 
 
@@ -131,16 +126,16 @@ def nearest(arm: SerialArm, target: Pose, near: Array) -> Chosen:
     """Of the configurations that reach `target` (n poses) the one closest to `near` (n, 6), rad.
 
     Close by the largest joint difference. Where none reaches, the joints are nan and the status is
-    JOINT_LIMIT if one would but for a limit.
+    ACTUATOR_LIMIT if one would but for a limit.
     """
     near = np.broadcast_to(near, (len(target.position), 6))
     found = inverse(arm, target, near)
     distance = np.abs(found.joints - near[:, None]).max(axis=2)
     best = np.argmin(np.where(found.reached, distance, np.inf), axis=1)
     rows = np.arange(len(near))
-    any_reached = found.reached.any(axis=1)
-    limited = (found.status == JOINT_LIMIT).any(axis=1)
-    status = np.where(any_reached, REACHED, np.where(limited, JOINT_LIMIT, OUT_OF_REACH))
+    any_reached = np.any(found.reached, axis=1)
+    limited = np.any(found.status == ACTUATOR_LIMIT, axis=1)
+    status = np.where(any_reached, REACHED, np.where(limited, ACTUATOR_LIMIT, OUT_OF_REACH))
     joints = np.where(any_reached[:, None], found.joints[rows, best], np.nan)
     return Chosen(joints, status, any_reached & found.singular[rows, best])
 
@@ -202,7 +197,7 @@ def _turn_x(angle: float) -> Array:
 def _place_centre(
     arm: SerialArm, constants: _Constants, centre: Array, shoulder: int, elbow: int
 ) -> tuple[Array, NDArray[np.bool_], NDArray[np.bool_]]:
-    """theta 1 to 3 (n, 3), whether the wrist centre is missed (n,), whether it is singular (n,)."""
+    """Theta 1 to 3 (n, 3), whether the wrist centre is missed (n,), whether it is singular (n,)."""
     upper, fore, fore_angle, signs = constants
     radius = np.hypot(centre[:, 0], centre[:, 1])
     on_axis = radius < SINGULAR_SINE * reach(arm)
@@ -234,7 +229,7 @@ def _wrist_rotation(arm: SerialArm, constants: _Constants, theta: Array, rotatio
 
 
 def _turn_wrist(constants: _Constants, wrist: Array, flip: int) -> tuple[Array, NDArray[np.bool_]]:
-    """theta 4 to 6 (n, 3), and whether the axes of joints 4 and 6 are in line (n,)."""
+    """Theta 4 to 6 (n, 3), and whether the axes of joints 4 and 6 are in line (n,)."""
     s4, s5 = constants.signs[3:]
     side = -1.0 if flip else 1.0
     sine = np.hypot(wrist[:, 0, 2], wrist[:, 1, 2])
@@ -257,7 +252,8 @@ def _nearest_turn(arm: SerialArm, joints: Array, near: Array) -> tuple[Array, ND
     first = np.ceil((low - LIMIT_TOLERANCE - joints) / _TURN)
     last = np.floor((high + LIMIT_TOLERANCE - joints) / _TURN)
     beyond = first > last
-    turn = np.clip(np.round((near - joints) / _TURN), first, np.maximum(first, last))
+    turn = np.round((near - joints) / _TURN)
+    turn = np.where(beyond, turn, np.clip(turn, first, last))
     turned = joints + _TURN * turn
     limited = np.where(beyond, turned, np.clip(turned, low, high))
-    return limited, beyond.any(axis=-1)
+    return limited, np.any(beyond, axis=-1)
