@@ -4,8 +4,9 @@ Standard Denavit-Hartenberg convention: link i is a turn by theta_i = joint_i + 
 shift by d_i along z and by a_i along x, and a turn by alpha_i about x.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,12 @@ class SerialArm:
         for number, (low, high) in enumerate(zip(self.minimum, self.maximum, strict=True), 1):
             if not low < high:
                 raise ParameterError(f"joint {number}: limits must increase, got {low} to {high}")
+
+    @classmethod
+    def from_rows(cls, rows: Sequence[Mapping[str, float]]) -> Self:
+        """Arm of one mapping a joint, from the names of the attributes to numbers."""
+        columns = {name: tuple(row[name] for row in rows) for name in cls.__dataclass_fields__}
+        return cls(**columns)
 
     @property
     def n_joints(self) -> int:
