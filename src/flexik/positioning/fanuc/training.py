@@ -128,3 +128,16 @@ def train_workspace(task: WorkspaceTask) -> tuple[Network, TrainingRecord]:
         [Quantity(*column) for column in OUTPUTS],
         restart=task.number,
     )
+
+
+def study_row(task: PathTask) -> dict[str, float | str]:
+    """Columns training_error, error_percent and stop_reason of a study, for one joint."""
+    network, record, _ = train_path(task, watch=False)
+    column = task.joints[0] - 1
+    found = network.predict(task.samples.positions)[:, 0]
+    squares = (found - task.samples.joints[:, column]) ** 2
+    return {
+        "training_error": float(np.sqrt(squares.mean()) / task.samples.ranges[column]),
+        "error_percent": float(error_percent(network, task.samples, task.joints)[0]),
+        "stop_reason": str(record.stop_reason),
+    }
