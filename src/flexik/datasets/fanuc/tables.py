@@ -131,3 +131,19 @@ def read_path(path: Path | str, fanuc: parameters.Fanuc) -> tuple[pd.DataFrame, 
     table = read_table(path, PATH_FIELDS, path_checksum(fanuc))
     is_test = table["is_test"].to_numpy() == 1
     return table[~is_test], table[is_test]
+
+
+def query_checksum(fanuc: parameters.Fanuc) -> str:
+    """Checksum of what the time of a query depends on: arm, networks' sizes, Newton steps."""
+    space = fanuc.workspace
+    sections = [*fanuc.joints, *fanuc.networks.values(), fanuc.refinement]
+    return checksum(parameters_checksum(sections), repr((space.n_hidden, space.activation)))
+
+
+def growth_checksum(fanuc: parameters.Fanuc) -> str:
+    """Checksum of what networks of other sizes and passes share with those of the workspace."""
+    space = fanuc.workspace
+    trainer = fanuc.trainers[space.trainer].model_copy(update={"n_iterations": 1})
+    sections = [trainer, fanuc.refinement, fanuc.success]
+    made_with = parameters_checksum(sections)
+    return checksum(poses_checksum(fanuc), made_with, repr((space.activation, space.seed)))
