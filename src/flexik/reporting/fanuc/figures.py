@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
 from flexik.datasets.fanuc.tables import COMMANDED, JOINTS, joints_of_rows
 from flexik.mechanisms.serial_arm import frames
@@ -50,7 +51,7 @@ def _colours(names: Sequence[str]) -> dict[str, str]:
 
 
 def _arm(results: Results) -> Figure:
-    """The arm halfway along the path, from the side of its own plane and from above."""
+    """The arm halfway along the path, from the side and from above."""
     path = pd.concat([results.training, results.test]).sort_values("share")
     middle = joints_of_rows(path)[len(path) // 2 : len(path) // 2 + 1]
     links = frames(results.arm, middle).origin[0]
@@ -96,15 +97,13 @@ def _training_error(results: Results) -> Figure:
         for name, colour in _colours(names).items():
             curves = results.curves
             curve = curves[(curves["network"] == name) & (curves["joint"] == number)]
-            x = curve["iteration"]
-            axes.plot(x, 100 * curve["training_error"], color=colour, linewidth=1.0, label=name)
             axes.plot(
-                x,
-                100 * curve["test_error"],
+                curve["iteration"],
+                100 * curve["training_error"],
                 color=colour,
-                linewidth=0.8,
-                linestyle=":",
-                label=f"{name}, test samples",
+                linewidth=0.9,
+                alpha=0.8,
+                label=name,
             )
         axes.set_yscale("log")
         style.true_minus(axes)
@@ -185,6 +184,7 @@ def _study(results: Results, varied: str) -> Figure:
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xticks(x, [f"{value:g}" for value in x])
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.minorticks_off()
     style.true_minus(axes)
     names = {"n_hidden": "hidden neurons (1)", "learning_factor": "learning factor (1)"}

@@ -44,6 +44,20 @@ def total_errors(results: Results) -> list[str]:
     return found
 
 
+def passes(results: Results) -> list[str]:
+    """How training and test errors compare at the end."""
+    found = []
+    for name in results.networks:
+        curves = results.curves[results.curves["network"] == name]
+        last = curves[curves["iteration"] == curves["iteration"].max()]
+        ratio = last["test_error"] / last["training_error"]
+        found.append(
+            f"{name}: after the last pass the test error of a joint is {ratio.min():.2f} to "
+            f"{ratio.max():.2f} times its training error."
+        )
+    return found
+
+
 def path_errors(results: Results) -> list[str]:
     """How errors of joints become errors of the end effector."""
     return [
@@ -92,7 +106,32 @@ def off_path(results: Results) -> list[str]:
             f"{name}: mean position error {near:.2f} mm at {MM * distances[0]:g} mm from the path, "
             f"{there:.0f} mm at {MM * distances[-1]:g} mm."
         )
+    n_steps = results.fanuc.refinement.n_steps
+    for name in [*results.networks, WHOLE]:
+        reached = _reached_everywhere(results, name, n_steps)
+        found.append(
+            f"{label(name, n_steps)}: reaches all targets up to {MM * reached:g} mm from the path."
+            if reached is not None
+            else f"{label(name, n_steps)}: misses targets even on the path."
+        )
     return found
+
+
+def _reached_everywhere(results: Results, method: str, n_steps: int) -> float | None:
+    """Largest distance, m, up to which every target is reached; None: not even the first."""
+    frame, limits = results.off_path, results.fanuc.success
+    chosen = frame[(frame["method"] == method) & (frame["n_steps"] == n_steps)]
+    reached = (
+        (chosen["within_limits"] == 1)
+        & (chosen["position_error"] <= limits.position)
+        & (chosen["orientation_error"] <= limits.orientation)
+    )
+    last = None
+    for distance, all_reached in reached.groupby(chosen["distance"]).all().items():
+        if not all_reached:
+            break
+        last = float(str(distance))
+    return last
 
 
 def whole_workspace(results: Results) -> list[str]:
@@ -106,13 +145,18 @@ def whole_workspace(results: Results) -> list[str]:
         f"Reached: {success(results)}.",
         f"{last}: reached {100 * values['success_rate']:.1f} %, median position error "
         f"{MM * values['median_position_error']:.2g} mm; {EXACT}: reached "
-        f"{100 * counts['success_rate']:.1f} %, largest position error "
-        f"{MM * counts['max_position_error']:.1e} mm.",
+        f"{100 * counts['success_rate']:.1f} %, largest position error below "
+        f"{_power_above(MM * counts['max_position_error']):.0e} mm.",
         "us: microseconds a pose on one core, measured apart from the pipeline (`make "
         "benchmark-fanuc`, reports/benchmarks/fanuc.md); single: one pose a call, batched: many; "
         "empty: not measured with these settings. opw: the package py-opw-kinematics, all "
         "configurations (as closed_form), from Python.",
     ]
+
+
+def _power_above(value: float) -> float:
+    """Least power of ten above `value`, at least 1e-9: digits below are the machine's."""
+    return float(10.0 ** max(-9, np.floor(np.log10(max(value, 1e-10))) + 1))
 
 
 def growth(results: Results) -> list[str]:

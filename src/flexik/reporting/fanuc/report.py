@@ -7,7 +7,7 @@ from flexik.files import file_checksum, write_json
 from flexik.parameters import parameters_checksum
 from flexik.reporting import page
 from flexik.reporting.fanuc import notes
-from flexik.reporting.fanuc.figures import write_figures
+from flexik.reporting.fanuc.figures import FLOOR, write_figures
 from flexik.reporting.fanuc.results import EXACT, WHOLE, Results
 from flexik.reporting.fanuc.tables import DEGREES, write_tables
 from flexik.reporting.style import MM
@@ -99,7 +99,7 @@ def _configurations(results: Results, folder: Path) -> page.Section:
         "path.\n\n" + "\n".join(lines)
     )
     figure = folder / "figures/training_error.png"
-    caption = "Training error of each joint (after figures 5.3 to 5.8); dotted: test samples."
+    caption = "Training error of each joint (after figures 5.3 to 5.8)."
     return page.Section(
         "Two configurations of networks",
         text,
@@ -164,7 +164,12 @@ def _whole(results: Results, folder: Path) -> page.Section:
         "The whole workspace against the closed form",
         text,
         [folder / f"{name}.md" for name in ("whole_workspace", "configurations", "growth")],
-        [(folder / "figures/whole_workspace.png", "Distribution of the errors at random poses.")],
+        [
+            (
+                folder / "figures/whole_workspace.png",
+                f"Distribution of the errors at random poses; below {FLOOR:g} drawn there.",
+            )
+        ],
     )
 
 

@@ -39,6 +39,7 @@ def write_tables(results: Results, folder: Path) -> None:
         0,
         "Passes over the training samples until the root mean square training error falls below a "
         "share of the joint's range; empty: never.",
+        notes.passes(results),
     )
     write_table(
         folder / "path_errors",
