@@ -160,6 +160,7 @@ def _whole(results: Results, folder: Path) -> page.Section:
         "sine of joints 4 and 6 times the sine of joint 5, which vanishes where they are free. "
         "Newton steps are damped."
     )
+    caption = f"Distribution of the errors at random poses; those below {FLOOR:g} stand there."
     return page.Section(
         "The whole workspace against the closed form",
         text,
