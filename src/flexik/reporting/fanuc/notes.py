@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from flexik import parameters
 from flexik.reporting.fanuc.results import EXACT, PUBLISHED_NETWORKS, WHOLE, Results, label
 from flexik.reporting.style import MM
 
@@ -35,13 +36,21 @@ def total_errors(results: Results) -> list[str]:
             f"config2 is the more precise for every joint (means {one.mean():.2f} % and "
             f"{other.mean():.2f} %)."
         )
-    found += [
-        f"{name}: mean total error {results.error_percents[name].mean():.3f} %, the same samples "
-        f"and the same kind of network as {name.partition('_')[0]}, another trainer."
-        for name in results.networks
-        if name.endswith("levenberg_marquardt")
-    ]
+    known = results.fanuc.networks
+    for number, name in enumerate(results.networks):
+        for twin in results.networks[:number]:
+            if _shape(known[name]) == _shape(known[twin]):
+                found.append(
+                    f"{name}: mean total error {results.error_percents[name].mean():.3f} %, with "
+                    f"the samples and the networks of {twin} "
+                    f"({results.error_percents[twin].mean():.3f} %) and another trainer."
+                )
+                break
     return found
+
+
+def _shape(network: parameters.PathNetwork) -> tuple[str, int, str]:
+    return network.outputs, network.n_hidden, network.activation
 
 
 def passes(results: Results) -> list[str]:

@@ -165,12 +165,7 @@ def _whole(results: Results, folder: Path) -> page.Section:
         "The whole workspace against the closed form",
         text,
         [folder / f"{name}.md" for name in ("whole_workspace", "configurations", "growth")],
-        [
-            (
-                folder / "figures/whole_workspace.png",
-                f"Distribution of the errors at random poses; below {FLOOR:g} drawn there.",
-            )
-        ],
+        [(folder / "figures/whole_workspace.png", caption)],
     )
 
 

@@ -37,8 +37,8 @@ def write_tables(results: Results, folder: Path) -> None:
         folder / "passes",
         passes(results),
         0,
-        "Passes over the training samples (steps, of Levenberg-Marquardt) until the root mean square training error falls below a "
-        "share of the joint's range; empty: never.",
+        "Passes over the training samples (steps, of Levenberg-Marquardt) until the root mean "
+        "square training error falls below a share of the joint's range; empty: never.",
         notes.passes(results),
     )
     write_table(
