@@ -122,7 +122,10 @@ def test_linkage_closes_over_the_strokes(geometry):
         (("joints", 4, "d", 0.1), "fanuc.joints: the closed form needs d5 = 0, got 0.1"),
         (("joints", 0, "alpha", 1.0), "fanuc.joints: the closed form needs alpha1 = +-pi/2"),
         (("path", "n_via_points", 2), "fanuc.path.n_via_points: "),
-        (("path", "region", 3, [-6.28, 6.28]), "fanuc.path: the path of seed 1 leaves limits of J4"),
+        (
+            ("path", "region", 3, [-6.28, 6.28]),
+            "fanuc.path: the path of seed 1 leaves limits of J4",
+        ),
     ],
 )
 def test_a_mistake_about_the_arm_is_one_line(folder, where, message):

@@ -153,7 +153,7 @@ def whole_workspace(results: Results) -> list[str]:
         "which is asked for.",
         f"Reached: {success(results)}.",
         f"{last}: reached {100 * values['success_rate']:.1f} %, median position error "
-        f"{MM * values['median_position_error']:.2g} mm; {EXACT}: reached "
+        f"{MM * values['median_position_error']:.3g} mm; {EXACT}: reached "
         f"{100 * counts['success_rate']:.1f} %, largest position error below "
         f"{_power_above(MM * counts['max_position_error']):.0e} mm.",
         "us: microseconds a pose on one core, measured apart from the pipeline (`make "
