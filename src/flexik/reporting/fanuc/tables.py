@@ -20,6 +20,13 @@ PASS_ERRORS = (0.05, 0.02)
 
 def write_tables(results: Results, folder: Path) -> None:
     """Write all tables as CSV and Markdown."""
+    _write_networks(results, folder)
+    _write_study(results, folder)
+    _write_off_path(results, folder)
+    _write_workspace(results, folder)
+
+
+def _write_networks(results: Results, folder: Path) -> None:
     write_table(
         folder / "joints",
         joints(results),
@@ -48,6 +55,9 @@ def write_tables(results: Results, folder: Path) -> None:
         "Where the end effector comes to stand on the path's test samples.",
         notes.path_errors(results),
     )
+
+
+def _write_study(results: Results, folder: Path) -> None:
     for varied, decimals in (("n_hidden", 0), ("learning_factor", 3)):
         table = study(results, varied)
         write_table(
@@ -58,6 +68,9 @@ def write_tables(results: Results, folder: Path) -> None:
             f"{results.fanuc.trainers[results.fanuc.study.trainer].n_iterations} passes.",
             notes.study(results, varied),
         )
+
+
+def _write_off_path(results: Results, folder: Path) -> None:
     write_table(
         folder / "off_path",
         off_path(results, "position_error", MM),
@@ -77,6 +90,9 @@ def write_tables(results: Results, folder: Path) -> None:
         1,
         f"Targets reached (%), {notes.success(results)}.",
     )
+
+
+def _write_workspace(results: Results, folder: Path) -> None:
     write_table(
         folder / "whole_workspace",
         whole_workspace(results),
