@@ -4,31 +4,38 @@ DVC deletes the outputs of a stage before running it, so a wrong value must be f
 Reads params.yaml. Writes data/validated.txt, whose content never changes.
 """
 
+import shutil
 import sys
 from pathlib import Path
 
 import numpy as np
 
 from flexik import parameters, stage
+from flexik.datasets.fanuc.samples import taught_path
 from flexik.errors import DataError, FlexikError, ParameterError
 from flexik.files import write_text
 from flexik.mechanisms.crane import CraneGeometry, check_assembly, smallest_extension
+from flexik.mechanisms.fanuc import check_spherical_wrist
+from flexik.mechanisms.serial_arm import SerialArm
 from flexik.multibody.crane.assembly import flexible_crane
 from flexik.parameters import load_parameters
 
 OUTPUT = Path("data/validated.txt")
-DATA = Path("data/crane")
+DATA, FANUC = Path("data/crane"), Path("data/fanuc")
 
 
 def main() -> None:
     """Run the stage; with --check alone nothing is written or removed."""
-    crane = load_parameters().crane
+    given = load_parameters()
+    crane, fanuc = given.crane, given.fanuc
     check_crane(crane)
+    check_fanuc(fanuc)
     if sys.argv[1:] == ["--check"]:
         return
     if sys.argv[1:]:
         raise FlexikError("usage: validate.py [--check]")
     remove_stale(crane)
+    remove_stale_networks(fanuc)
     write_text(OUTPUT, "params.yaml is valid\n")
 
 
@@ -61,6 +68,19 @@ def check_crane(crane: parameters.Crane) -> None:
         raise ParameterError("params.yaml: crane.workspace: the crane reaches nothing in x, y")
 
 
+def check_fanuc(fanuc: parameters.Fanuc) -> None:
+    """The closed form fits the arm, the taught path stays within the limits of the joints."""
+    try:
+        arm = SerialArm.from_rows([joint.model_dump() for joint in fanuc.joints])
+        check_spherical_wrist(arm)
+    except ParameterError as error:
+        raise ParameterError(f"params.yaml: fanuc.joints: {error}") from None
+    try:
+        taught_path(arm, fanuc.path)
+    except ParameterError as error:
+        raise ParameterError(f"params.yaml: {error}") from None
+
+
 def remove_stale(crane: parameters.Crane) -> None:
     """Delete what stages of earlier names left, which would stay inputs of the report."""
     evaluations = {f"{label}.parquet" for label in ("none", *crane.methods)}
@@ -79,6 +99,14 @@ def remove_stale(crane: parameters.Crane) -> None:
             if path.is_file() and path.name not in names:
                 print(f"removing {path}: its name is not in params.yaml")
                 path.unlink()
+
+
+def remove_stale_networks(fanuc: parameters.Fanuc) -> None:
+    """Delete networks of the taught path, and their curves, of names that are no more."""
+    for path in [*FANUC.glob("networks/[!.]*"), *FANUC.glob("curves/[!.]*")]:
+        if path.name.removesuffix(".parquet") not in fanuc.networks:
+            print(f"removing {path}: its name is not in params.yaml")
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
 if __name__ == "__main__":

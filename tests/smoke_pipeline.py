@@ -11,7 +11,7 @@ import yaml
 from flexik.parameters import PARAMETERS_FILE, read_yaml
 
 ROOT = Path(__file__).parents[1]
-CRANE = read_yaml(ROOT / PARAMETERS_FILE)["crane"]
+CRANE, FANUC = (read_yaml(ROOT / PARAMETERS_FILE)[case] for case in ("crane", "fanuc"))
 GENERATED = ("grid", "selection")
 
 

@@ -2,14 +2,12 @@
 
 import itertools
 import math
-import sys
 
 import numpy as np
 import pytest
 import torch
 from learning_problems import dense, errors_function, some_problem, taught
 
-from flexik.errors import TrainingError
 from flexik.learning.adam import Adam
 from flexik.learning.back_propagation import BackPropagation
 from flexik.learning.lbfgs import Lbfgs
@@ -171,8 +169,15 @@ def test_patience_counts_from_the_least_selection_error():
     assert (minimum.kept, minimum.weights) == (1, weights[1])
 
 
-def test_adam_without_torch_says_so(monkeypatch):
-    # None makes Python's import fail
-    monkeypatch.setitem(sys.modules, "torch", None)
-    with pytest.raises(TrainingError, match="adam needs the package torch"):
-        minimise(*some_problem(), Adam())
+def test_the_rate_of_adam_falls_along_half_a_cosine():
+    limits = Adam(n_iterations=2, learning_rate=0.01, final_rate=0.2)
+    assert [limits.rate(done) for done in (0.0, 0.5, 1.0)] == pytest.approx([0.01, 0.006, 0.002])
+    start, problem = some_problem()
+    # the first steps of Adam are as long as its rate
+    first = minimise(start, problem, Adam(n_iterations=1, learning_rate=0.01, final_rate=0.0))
+    assert np.abs(flatten(first.weights) - flatten(start)).max() == pytest.approx(0.01, rel=1e-4)
+    constant = Adam(n_iterations=2, learning_rate=0.01)
+    assert constant.rate(0.7) == constant.rate(0.0)
+    one, other = (minimise(start, problem, settings) for settings in (limits, constant))
+    moves = [np.abs(flatten(run.weights) - flatten(first.weights)).max() for run in (one, other)]
+    assert moves[0] == pytest.approx(0.6 * moves[1], rel=1e-6)

@@ -285,6 +285,23 @@ def test_every_trainer_learns_through_the_same_door(name, options, n_hidden, act
     assert record_again == record
 
 
+@every_trainer
+def test_an_observer_sees_the_network_of_every_iteration(name, options):
+    seen = []
+    settings = trainer_settings(name, options | {"n_iterations": 5})
+    inputs, outputs = data(150)
+    arguments = (inputs, outputs, Architecture(4), settings, 0, INPUTS, OUTPUTS)
+    network, record = train(*arguments, observer=seen.append)
+    assert len(seen) == len(record.errors)
+    assert_same_weights(seen[record.kept], network)
+    normalisation = network.output_normalisation
+    for watched, error in zip(seen, record.errors, strict=True):
+        residuals = normalisation.to_unit(watched.predict(inputs)) - normalisation.to_unit(outputs)
+        assert np.mean(residuals**2) == pytest.approx(error, rel=1e-10)
+    # who looks on changes nothing
+    assert_same_weights(train(*arguments)[0], network)
+
+
 @pytest.mark.parametrize("name", EVERY_TRAINER)
 def test_the_number_of_threads_and_processes_does_not_matter(name):
     settings = trainer_settings(name, EVERY_TRAINER[name] | {"n_iterations": 10})

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from smoke_pipeline import (
     CRANE,
+    FANUC,
     GENERATED,
     ROOT,
     call,
@@ -142,6 +143,29 @@ def test_an_edited_section_is_noticed_by_the_stages_that_read_it(copy):
         assert set(json.loads(done.stdout)) == {"validate", "crane_report", *expected}, values
 
 
+EVERY_ARM_NETWORK = {f"fanuc_train@{name}" for name in FANUC["networks"]}
+WATCHING_ARM = [
+    ({"networks__config2__seed": 2}, {"fanuc_train@config2", "fanuc_evaluate"}),
+    ({"trainers__adam__beta_1": 0.8}, {"fanuc_train_workspace", "fanuc_evaluate"}),
+    ({"study__n_restarts": 2}, {"fanuc_study"}),
+    (
+        {"path__seed": 2},
+        {"fanuc_generate", *EVERY_ARM_NETWORK, "fanuc_study", "fanuc_evaluate"},
+    ),
+    ({"success__position": 0.002}, set()),
+]
+
+
+def test_stages_of_the_arm_notice_their_own_sections(copy):
+    original = (copy / PARAMETERS_FILE).read_text()
+    for values, expected in WATCHING_ARM:
+        (copy / PARAMETERS_FILE).write_text(original)
+        edit(copy, **{f"fanuc__{key}": value for key, value in values.items()})
+        done = call(copy, "dvc", "status", "--json")
+        assert done.returncode == 0, done.stderr
+        assert set(json.loads(done.stdout)) == {"validate", "fanuc_report", *expected}, values
+
+
 def test_a_wrong_parameter_is_one_line_that_names_it(copy):
     edit(copy, crane__structure__beams__lift__mass=-124.6)
     done = reproduce(copy)
@@ -167,6 +191,7 @@ def test_a_damaged_table_is_one_line_that_names_it(copy):
         ("crane_select.py", "nothing", "crane: there is no network of selected size"),
         ("crane_select.py", "modular", "crane: there is no network of selected size"),
         ("crane_evaluate.py", "nothing", "crane.methods"),
+        ("fanuc_train.py", "nothing", "fanuc: there is no network"),
     ],
 )
 def test_an_unknown_name_is_told(copy, script, argument, named):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from smoke_pipeline import CRANE, ROOT
+from smoke_pipeline import CRANE, FANUC, ROOT
 
 from flexik.datasets.crane.evaluations import TARGET_FIELDS, TOLERANCE_FIELDS
 from flexik.datasets.crane.grid import FIELDS
@@ -121,6 +121,25 @@ def test_tables_and_figures_are_there_and_linked(project):
     assert all(method in tables for method in METHODS)
     # the README shows the table that was just made
     assert table.strip().splitlines()[-1] in (project / "README.md").read_text()
+
+
+def test_the_report_of_the_arm_is_there_with_its_metrics(project):
+    folder = project / "reports/fanuc"
+    metrics = json.loads((folder / "metrics.json").read_text())
+    assert all(isinstance(v, int | float) and math.isfinite(v) for v in metrics.values())
+    for name in FANUC["networks"]:
+        for joint in range(1, 7):
+            assert metrics[f"{name}.joint{joint}_error_percent"] > 0.0
+        assert metrics[f"{name}.mean_position_error_mm"] > 0.0
+        assert metrics[f"{name}.mean_orientation_error_deg"] > 0.0
+    # whatever the networks learnt
+    assert metrics["closed_form.max_position_error_mm"] == 0.0
+    assert metrics["closed_form.success_percent"] == 100.0
+    page = (folder / "README.md").read_text()
+    assert "not available" in page and "Not measured with these settings" in page
+    for figure in (folder / "figures").iterdir():
+        assert figure.read_bytes().startswith(b"\x89PNG")
+        assert f"figures/{figure.name}" in page
 
 
 def test_reports_say_nothing_of_the_machine(project):

@@ -23,9 +23,9 @@ def folder(tmp_path):
     return tmp_path
 
 
-def change(folder, *path_and_value):
+def change(folder, *path_and_value, case="crane"):
     data = yaml.safe_load((folder / "params.yaml").read_text())
-    section = data["crane"]
+    section = data[case]
     *path, last, value = path_and_value
     for name in path:
         section = section[name]
@@ -114,3 +114,37 @@ def test_linkage_closes_over_the_strokes(geometry):
     longer = CraneGeometry(**{**vars(geometry), "stroke_maximum": (0.535, 1.5, 1.6)})
     with pytest.raises(ParameterError, match="jib stroke of"):
         check_assembly(longer)
+
+
+@pytest.mark.parametrize(
+    ("where", "message"),
+    [
+        (("joints", 4, "d", 0.1), "fanuc.joints: the closed form needs d5 = 0, got 0.1"),
+        (("joints", 0, "alpha", 1.0), "fanuc.joints: the closed form needs alpha1 = +-pi/2"),
+        (("path", "n_via_points", 2), "fanuc.path.n_via_points: "),
+        (
+            ("path", "region", 3, [-6.28, 6.28]),
+            "fanuc.path: the path of seed 1 leaves limits of J4",
+        ),
+    ],
+)
+def test_a_mistake_about_the_arm_is_one_line(folder, where, message):
+    change(folder, *where, case="fanuc")
+    done = validate(folder)
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"error: params.yaml: {message}")
+
+
+def test_networks_of_the_arm_that_are_gone_are_removed(folder):
+    kept = [folder / "data/fanuc/networks/config1/joints_1.json"]
+    kept += [folder / "data/fanuc/curves/config1.parquet"]
+    stale = [folder / "data/fanuc/networks/gone/joints_1.json"]
+    stale += [folder / "data/fanuc/curves/gone.parquet"]
+    for path in (*kept, *stale):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    done = validate(folder)
+    assert done.returncode == 0, done.stderr
+    assert all(path.exists() for path in kept) and not any(path.exists() for path in stale)
+    assert not stale[0].parent.exists() and done.stdout.count("removing") == len(stale)

@@ -1,7 +1,7 @@
 """What a trainer minimises: the mean squared error of a perceptron on normalised data."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -54,12 +54,14 @@ class Problem:
     inputs : (p + 1, n), normalised, the last row 1
     targets : (q, n), normalised
     selection : inputs and targets of the same form the training does not see, if any
+    observer : sees the weights each iteration ends with, the initial ones first
     """
 
     activation: str
     inputs: Array
     targets: Array
     selection: tuple[Array, Array] | None = None
+    observer: Callable[[Weights], None] | None = None
     # the last hidden weights and their chunks, or nothing
     _memory: list[tuple[Weights, list[Chunk]]] = field(default_factory=list, init=False, repr=False)
 
@@ -128,12 +130,13 @@ def problem(
     inputs: Array,
     targets: Array,
     selection: tuple[Array, Array] | None = None,
+    observer: Callable[[Weights], None] | None = None,
 ) -> Problem:
     """Problem of normalised samples: inputs (n, p), targets (n, q), selection of the same form."""
     if selection is not None:
         selection = _with_bias(selection[0]), np.ascontiguousarray(selection[1].T)
     targets = np.ascontiguousarray(targets.T)
-    return Problem(activation, _with_bias(inputs), targets, selection)
+    return Problem(activation, _with_bias(inputs), targets, selection, observer)
 
 
 def _with_bias(inputs: Array) -> Array:

@@ -133,6 +133,8 @@ class Monitor:
                 self._weights = weights
             return StopReason.NON_FINITE
         self.errors.append(error)
+        if self.problem.observer is not None:
+            self.problem.observer(weights)
         patience = self.settings.selection_patience
         judged = error if patience is None else self.problem.selection_error(weights)
         # false for nan; the first weights are kept until others are better

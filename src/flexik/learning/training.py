@@ -51,6 +51,8 @@ __all__ = [
 
 # Selection error of a network where the error of its outputs is not what counts
 Judge = Callable[[Network], float]
+# Sees the network of every iteration, the initial one first
+Observer = Callable[[Network], None]
 
 
 @dataclass(frozen=True)
@@ -160,6 +162,7 @@ class _Task:
     quantities: tuple[tuple[Quantity, ...], tuple[Quantity, ...]]
     selection: tuple[Array, Array] | None
     judge: Judge | None
+    observer: Observer | None = None
 
 
 def train(
@@ -173,6 +176,7 @@ def train(
     selection: tuple[Array, Array] | None = None,
     restart: int = 0,
     judge: Judge | None = None,
+    observer: Observer | None = None,
 ) -> tuple[Network, TrainingRecord]:
     """Train one network; the same as restart `restart` of `train_best`.
 
@@ -184,6 +188,7 @@ def train(
     input_quantities, output_quantities : names and units of the p and q columns
     selection : inputs (m, p) and outputs (m, q) the training does not see, if any
     judge : gives the selection error, else that of the normalised outputs on `selection`
+    observer : called with the network of every iteration, as many as the record has errors
 
     Raises
     ------
@@ -199,10 +204,8 @@ def train(
         selection = _checked_pair("selection", *selection, quantities)
     elif settings.selection_patience is not None:
         raise TrainingError("trainer setting selection_patience needs selection data")
-    task = _Task(
-        *data, architecture, settings, _checked_seed(seed), 1, quantities, selection, judge
-    )
-    _check_size(task)
+    task = _Task(*data, architecture, settings, seed, 1, quantities, selection, judge, observer)
+    _check(task)
     network, record = _run(task, restart)
     if network is None:
         raise _no_network(task, [record])
@@ -252,9 +255,8 @@ def train_best(
     quantities = tuple(input_quantities), tuple(output_quantities)
     data = _checked_pair("training", inputs, outputs, quantities)
     selection = _checked_pair("selection", selection_inputs, selection_outputs, quantities)
-    seed = _checked_seed(seed)
     task = _Task(*data, architecture, settings, seed, n_restarts, quantities, selection, judge)
-    _check_size(task)
+    _check(task)
     runs = sorted(
         map_function(functools.partial(_run, task), range(n_restarts)),
         key=lambda run: run[1].restart,
@@ -270,14 +272,13 @@ def train_best(
 def _run(task: _Task, restart: int) -> tuple[Network | None, TrainingRecord]:
     started = time.perf_counter()
     name, trainer = _trainer(task.settings)
-    activation = task.architecture.activation
     normalisations = Normalisation.from_data(task.inputs), Normalisation.from_data(task.outputs)
     generator = np.random.default_rng((task.seed, restart))
     start = initial_weights(
         task.inputs.shape[1],
         task.architecture.hidden_sizes,
         task.outputs.shape[1],
-        activation,
+        task.architecture.activation,
         generator,
     )
     # the order of sums in a product depends on the number of threads, so it is one everywhere
@@ -296,8 +297,7 @@ def _run(task: _Task, restart: int) -> tuple[Network | None, TrainingRecord]:
     )
     if not minimum.errors:
         return None, record
-    weights = tuple(matrix.copy() for matrix in minimum.weights)
-    network = Network(weights, activation, *normalisations, *task.quantities)
+    network = _network(task, minimum.weights, normalisations)
     if task.judge is not None:
         record = replace(record, selection_error=task.judge(network))
     elif task.selection is not None:
@@ -305,6 +305,13 @@ def _run(task: _Task, restart: int) -> tuple[Network | None, TrainingRecord]:
         residuals = normalisations[1].to_unit(network.predict(values)) - expected
         record = replace(record, selection_error=float(np.sqrt(np.mean(residuals**2))))
     return network, record
+
+
+def _network(
+    task: _Task, weights: Weights, normalisations: tuple[Normalisation, Normalisation]
+) -> Network:
+    copies = tuple(matrix.copy() for matrix in weights)
+    return Network(copies, task.architecture.activation, *normalisations, *task.quantities)
 
 
 def _trainer(settings: Stopping) -> tuple[str, Trainer]:
@@ -321,7 +328,13 @@ def _problem(task: _Task, normalisations: tuple[Normalisation, Normalisation]) -
     # the trainer sees the selection data only to stop by them
     asked = task.settings.selection_patience is not None
     selection = unit(*task.selection) if asked and task.selection is not None else None
-    return problem(task.architecture.activation, *unit(task.inputs, task.outputs), selection)
+    watch, data = task.observer, unit(task.inputs, task.outputs)
+
+    def observe(weights: Weights) -> None:
+        if watch is not None:
+            watch(_network(task, weights, normalisations))
+
+    return problem(task.architecture.activation, *data, selection, observe if watch else None)
 
 
 def _selection_error(run: tuple[Network | None, TrainingRecord]) -> float:
@@ -333,16 +346,9 @@ def _no_network(task: _Task, records: list[TrainingRecord]) -> TrainingError:
     outputs = ", ".join(quantity.name for quantity in task.quantities[1])
     reasons = ", ".join(f"{record.restart}: {record.stop_reason}" for record in records)
     return TrainingError(
-        f"network for {outputs} with {task.architecture.n_hidden} "
-        f"{task.architecture.activation} units, seed {task.seed}: "
-        f"no usable network, restarts ended with {reasons}"
+        f"network for {outputs} with {task.architecture.n_hidden} {task.architecture.activation} "
+        f"units, seed {task.seed}: no usable network, restarts ended with {reasons}"
     )
-
-
-def _checked_seed(seed: int) -> int:
-    if seed < 0:
-        raise TrainingError(f"seed={seed}, expected 0 or more")
-    return int(seed)
 
 
 def _checked_pair(
@@ -377,7 +383,9 @@ def _checked(role: str, values: Array, quantities: tuple[Quantity, ...]) -> Arra
     return values
 
 
-def _check_size(task: _Task) -> None:
+def _check(task: _Task) -> None:
+    if task.seed < 0:
+        raise TrainingError(f"seed={task.seed}, expected 0 or more")
     n_outputs, n_hidden = task.outputs.shape[1], task.architecture.n_hidden
     sizes = (task.inputs.shape[1], *task.architecture.hidden_sizes, n_outputs)
     n_weights = sum(n_units * (n_before + 1) for n_before, n_units in itertools.pairwise(sizes))

@@ -6,6 +6,8 @@ where DVC watches it. The names `size` and `nfiles` are never used: DVC's run ca
 
 from flexik.parameters.crane import Crane
 from flexik.parameters.data import Workspace
+from flexik.parameters.fanuc import Fanuc, PathNetwork
+from flexik.parameters.fanuc import Path as FanucPath
 from flexik.parameters.measured import Measured
 from flexik.parameters.methods import CombinedModel, InvertedModel, MethodModel
 from flexik.parameters.model import Model as Section
@@ -31,12 +33,15 @@ __all__ = [
     "AnyNetwork",
     "CombinedModel",
     "Crane",
+    "Fanuc",
+    "FanucPath",
     "InvertedModel",
     "Measured",
     "MethodModel",
     "ModularNetwork",
     "NetworkModel",
     "Parameters",
+    "PathNetwork",
     "Section",
     "SelectedModularNetwork",
     "Structure",

@@ -12,6 +12,7 @@ from pydantic import BaseModel, Field, ValidationError
 from flexik.errors import ParameterError
 from flexik.files import checksum
 from flexik.parameters.crane import Crane
+from flexik.parameters.fanuc import Fanuc
 from flexik.parameters.model import Model
 
 PARAMETERS_FILE = "params.yaml"
@@ -29,6 +30,7 @@ class Parameters(Model):
 
     parallel: Parallel
     crane: Crane
+    fanuc: Fanuc
 
 
 def load_parameters(path: Path | str = PARAMETERS_FILE) -> Parameters:

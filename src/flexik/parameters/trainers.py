@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flexik.parameters.model import Count, Model, NotNegative, Positive
+from flexik.parameters.model import Count, Model, NotNegative, Positive, Share
 
 
 class Stopping(Model):
@@ -71,6 +71,7 @@ class Adam(Stopping):
 
     kind: Literal["adam"]
     learning_rate: Positive
+    final_rate: Share
     beta_1: Annotated[float, Field(ge=0, lt=1)]
     beta_2: Annotated[float, Field(ge=0, lt=1)]
     batch_size: Count | None

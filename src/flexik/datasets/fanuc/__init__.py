@@ -1,0 +1,1 @@
+"""Taught path, random poses and errors of the six-joint arm."""

@@ -1,0 +1,79 @@
+"""From poses to joints: networks of a taught path, networks of the whole workspace, closed form.
+
+A method takes the targets and the number of the arm configuration that each is asked for, and gives
+joints (n, 6) in rad; nan where it has none.
+"""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexik.mechanisms.fanuc import inverse
+from flexik.mechanisms.pose_representation import joints_of, pose_inputs
+from flexik.mechanisms.serial_arm import Array, Pose, SerialArm, refine
+from flexik.positioning.method import Network, PositioningError
+
+JointMethod = Callable[[Pose, NDArray[np.int64]], Array]
+
+
+def closed_form(arm: SerialArm) -> JointMethod:
+    """The analytical inverse; nan where the configuration does not reach within the limits."""
+
+    def method(target: Pose, number: NDArray[np.int64]) -> Array:
+        found = inverse(arm, target)
+        rows = np.arange(len(number))
+        reached = found.reached[rows, number]
+        return np.where(reached[:, None], found.joints[rows, number], np.nan)
+
+    return method
+
+
+def path_networks(networks: Mapping[tuple[int, ...], Network]) -> JointMethod:
+    """Networks from position alone, by the joints (numbers from 1) that each gives.
+
+    They know one configuration and the orientations of their path, so that they look at neither.
+    Raises PositioningError unless every joint has one network.
+    """
+    given = [joint for joints in networks for joint in joints]
+    if sorted(given) != list(range(1, 7)):
+        raise PositioningError(f"expected networks for joints 1 to 6, each once, got {given}")
+
+    def method(target: Pose, number: NDArray[np.int64]) -> Array:
+        joints = np.empty((len(number), 6))
+        for numbers, network in networks.items():
+            joints[:, np.array(numbers) - 1] = network.predict(target.position)
+        return joints
+
+    return method
+
+
+def workspace_networks(arm: SerialArm, networks: Mapping[int, Network]) -> JointMethod:
+    """One network an arm configuration, from position and orientation.
+
+    Raises PositioningError when asked for a configuration without a network.
+    """
+
+    def method(target: Pose, number: NDArray[np.int64]) -> Array:
+        joints = np.empty((len(number), 6))
+        for each in np.unique(number):
+            if int(each) not in networks:
+                raise PositioningError(f"no network for arm configuration {each}")
+            rows = number == each
+            outputs = networks[int(each)].predict(pose_inputs(target.rows(rows)))
+            joints[rows] = joints_of(arm, outputs, int(each))
+        return joints
+
+    return method
+
+
+def refined(
+    arm: SerialArm, method: JointMethod, n_steps: int, damping: float, orientation_length: float
+) -> JointMethod:
+    """`method` and damped Newton steps after it, see mechanisms.serial_arm.refine."""
+
+    def steps(target: Pose, number: NDArray[np.int64]) -> Array:
+        joints = method(target, number)
+        return refine(arm, target, joints, n_steps, damping, orientation_length)
+
+    return steps if n_steps else method

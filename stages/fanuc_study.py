@@ -1,0 +1,61 @@
+"""Train the network of one joint in several sizes and with several learning factors.
+
+Reads params.yaml: parallel, fanuc.study, fanuc.networks, fanuc.trainers (and fanuc.joints,
+fanuc.path to know which data belong to it); data/fanuc/path.parquet.
+Writes data/fanuc/study.parquet.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from flexik import stage
+from flexik.datasets.fanuc.tables import (
+    STUDY_FIELDS,
+    joints_of_rows,
+    read_path,
+    study_checksum,
+    write_frame,
+)
+from flexik.datasets.parallel import ParallelSettings, from_environment, parallel_map
+from flexik.learning.training import Architecture, trainer_settings
+from flexik.parameters import load_parameters
+from flexik.positioning.fanuc.training import PathTask, TaughtSamples, study_row
+
+DATA = Path("data/fanuc")
+
+
+def main() -> None:
+    """Run the stage."""
+    given = load_parameters()
+    fanuc = given.fanuc
+    study, network = fanuc.study, fanuc.networks[fanuc.study.network]
+    training, test = read_path(DATA / "path.parquet", fanuc)
+    samples = TaughtSamples(
+        training[["x", "y", "z"]].to_numpy(),
+        joints_of_rows(training),
+        test[["x", "y", "z"]].to_numpy(),
+        joints_of_rows(test),
+    )
+    trainer = fanuc.trainers[study.trainer].model_dump()
+    kind, factor = trainer.pop("kind"), trainer["learning_rate"]
+    cases = [("n_hidden", float(n), n, factor) for n in study.n_hidden]
+    cases += [("learning_factor", each, network.n_hidden, each) for each in study.learning_factors]
+    tasks, rows = [], []
+    for varied, value, n_hidden, learning_rate in cases:
+        settings = trainer_settings(kind, trainer | {"learning_rate": learning_rate})
+        architecture = Architecture(n_hidden, network.activation)
+        for restart in range(study.n_restarts):
+            task = PathTask(samples, (study.joint,), architecture, settings, network.seed, restart)
+            tasks.append(task)
+            rows.append({"varied": varied, "value": value, "restart": restart})
+    workers = from_environment(ParallelSettings(**given.parallel.model_dump()))
+    results = parallel_map(study_row, tasks, workers, "study")
+    frame = pd.DataFrame([row | result for row, result in zip(rows, results, strict=True)])
+    frame["restart"] = frame["restart"].astype(np.int64)
+    write_frame(DATA / "study.parquet", frame, STUDY_FIELDS, study_checksum(fanuc))
+
+
+if __name__ == "__main__":
+    stage.run(main)

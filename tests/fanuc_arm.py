@@ -1,0 +1,19 @@
+"""The arm of params.yaml, written down once more, and poses to test it with."""
+
+import numpy as np
+
+from flexik.mechanisms.serial_arm import SerialArm
+
+LIMITS = np.deg2rad([[-180, -90, -160, -360, -125, -360], [180, 135, 280, 360, 125, 360]])
+ARM = SerialArm(
+    offset=(0.0, -np.pi / 2, 0.0, 0.0, 0.0, 0.0),
+    d=(0.565, 0.0, 0.0, -1.016, 0.0, -0.175),
+    a=(0.15, 0.87, 0.17, 0.0, 0.0, 0.0),
+    alpha=(-np.pi / 2, np.pi, -np.pi / 2, np.pi / 2, -np.pi / 2, np.pi),
+    minimum=tuple(LIMITS[0]),
+    maximum=tuple(LIMITS[1]),
+)
+
+
+def random_joints(n, seed=0):
+    return np.random.default_rng(seed).uniform(*LIMITS, (n, 6))

@@ -1,0 +1,236 @@
+"""The report of the six-joint arm: its numbers, notes and files follow from the results."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from fanuc_arm import ARM
+
+from flexik.datasets.fanuc.samples import taught_path
+from flexik.datasets.fanuc.tables import COMMANDED, JOINTS, joint_columns
+from flexik.evaluation.fanuc.errors import workspace_errors
+from flexik.mechanisms.serial_arm import forward
+from flexik.parameters import overlay, read_yaml, validate
+from flexik.reporting.fanuc import notes, tables
+from flexik.reporting.fanuc.report import metrics, write_report
+from flexik.reporting.fanuc.results import EXACT, WHOLE, Results
+
+ROOT = Path(__file__).parents[1]
+SMALL = {
+    "path": {"n_training": 40, "n_test": 20},
+    "off_path": {"distances": [0.0, 0.02]},
+    "workspace": {"n_targets": 5},
+    "study": {"n_hidden": [2, 5], "learning_factors": [0.1]},
+}
+
+
+@pytest.fixture(scope="module")
+def fanuc():
+    return validate(overlay(read_yaml(ROOT / "params.yaml"), {"fanuc": SMALL})).fanuc
+
+
+def study_frame():
+    rows = [
+        ("n_hidden", 2.0, 0, 0.2, 10.0, "iterations"),
+        ("n_hidden", 2.0, 1, 0.1, 4.0, "iterations"),
+        ("n_hidden", 2.0, 2, 0.1, 6.0, "iterations"),
+        ("n_hidden", 5.0, 0, 0.02, 1.0, "iterations"),
+        ("n_hidden", 5.0, 1, 0.02, 3.0, "non_finite"),
+        ("learning_factor", 0.1, 0, 0.02, 2.0, "iterations"),
+    ]
+    names = ("varied", "value", "restart", "training_error", "error_percent", "stop_reason")
+    return pd.DataFrame(rows, columns=names)
+
+
+def curves_frame(fanuc):
+    rows = [
+        (name, joint, k, error, 1.5 * error)
+        for name in fanuc.networks
+        for joint in range(1, 7)
+        for k, error in enumerate((0.5, 0.04 if joint > 1 else 0.3, 0.03))
+    ]
+    names = ("network", "joint", "iteration", "training_error", "test_error")
+    return pd.DataFrame(rows, columns=names)
+
+
+def off_path_frame(fanuc, success):
+    rows = []
+    for name in [*fanuc.networks, WHOLE]:
+        for n_steps in range(4):
+            for distance in (0.0, 0.02):
+                n = 20 if distance == 0.0 else 18
+                error = 0.01 * (1 + 100 * distance) / 1000**n_steps
+                rows += [(name, distance, n_steps, error, error, 1)] * n
+    rows += [(EXACT, 0.0, 0, 0.0, 0.0, 1)] * 20 + [(EXACT, 0.02, 0, 0.0, 0.0, 1)] * 18
+    names = ("method", "distance", "n_steps", "position_error", "orientation_error")
+    return pd.DataFrame(rows, columns=(*names, "within_limits"))
+
+
+def workspace_frame():
+    rows = [
+        (WHOLE, number, n_steps, 0.1 / 100**n_steps, 0.1 / 100**n_steps, 1)
+        for n_steps in range(4)
+        for number in range(8)
+        for _ in range(5)
+    ]
+    rows += [(EXACT, number, 0, 3e-16, 0.0, 1) for number in range(8) for _ in range(5)]
+    names = ("method", "configuration", "n_steps", "position_error", "orientation_error")
+    return pd.DataFrame(rows, columns=(*names, "within_limits"))
+
+
+@pytest.fixture(scope="module")
+def results(fanuc):
+    path = taught_path(ARM, fanuc.path)
+    position = forward(ARM, path.joints).position
+    columns = {"share": path.share, **joint_columns(path.joints)}
+    columns |= {name: position[:, k] for k, name in enumerate("xyz")}
+    table = pd.DataFrame(columns)
+    test, joints = table[path.is_test], path.joints[path.is_test]
+    frames = []
+    for name, error in zip([*fanuc.networks, WHOLE, EXACT], (1, 2, 0.1, 0.2, 5, 0), strict=True):
+        commanded = joints + 0.01 * error * np.ptp(path.joints, axis=0)
+        frame = pd.DataFrame(
+            {
+                "share": test["share"].to_numpy(),
+                **joint_columns(joints),
+                **joint_columns(commanded, COMMANDED),
+                **workspace_errors(ARM, forward(ARM, joints), commanded),
+            }
+        )
+        frames.append(frame.assign(method=name))
+    empty = [None] * 6
+    return Results(
+        fanuc=fanuc,
+        training=table[~path.is_test],
+        test=test,
+        curves=curves_frame(fanuc),
+        study=study_frame(),
+        path_errors=pd.concat(frames, ignore_index=True),
+        off_path=off_path_frame(fanuc, None),
+        workspace=workspace_frame(),
+        published=pd.DataFrame(
+            {"joint": range(1, 7), "config1": empty, "config2": empty}, dtype=float
+        ),
+        times=pd.DataFrame(
+            {
+                "method": [WHOLE, "opw"],
+                "microseconds_single": [40.0, 5.0],
+                "microseconds_batched": [1.5, 9.0],
+            }
+        ),
+        growth=pd.DataFrame(
+            columns=[*tables.GROWTH_NAMES],
+        ),
+    )
+
+
+def test_total_errors_are_shares_of_the_range(results):
+    for name, percent in zip(results.networks, (1.0, 2.0, 0.1, 0.2), strict=True):
+        assert results.error_percents[name] == pytest.approx(np.full(6, percent))
+    table = tables.total_errors(results)
+    assert table["config2 (%)"].tolist() == pytest.approx([2.0] * 7)
+    assert table["joint"].tolist() == [1, 2, 3, 4, 5, 6, "mean"]
+
+
+def test_what_is_not_published_is_marked_and_what_is_stands_beside(results):
+    table = tables.total_errors(results)
+    assert set(table["config1 published"]) == {tables.NOT_AVAILABLE}
+    known = results.published.copy()
+    known.loc[known["joint"] == 3, "config1"] = 4.5
+    table = tables.total_errors(dataclasses.replace(results, published=known))
+    assert table["config1 published"].tolist() == [
+        *([tables.NOT_AVAILABLE] * 2),
+        *(4.5, tables.NOT_AVAILABLE, tables.NOT_AVAILABLE, tables.NOT_AVAILABLE),
+        # no mean of some
+        tables.NOT_AVAILABLE,
+    ]
+
+
+def test_metrics_have_the_names_others_look_for(results):
+    found = metrics(results)
+    for name in ("config1", "config2"):
+        for joint in range(1, 7):
+            value = found[f"{name}.joint{joint}_error_percent"]
+            assert value == pytest.approx(1.0 if name == "config1" else 2.0)
+        assert found[f"{name}.mean_position_error_mm"] > 0.0
+        assert found[f"{name}.mean_orientation_error_deg"] > 0.0
+    assert found[f"{WHOLE}_refined_1.mean_position_error_mm"] == pytest.approx(1.0)
+    assert found[f"{WHOLE}.mean_orientation_error_deg"] == pytest.approx(5.7296)
+    assert found[f"{EXACT}.success_percent"] == 100.0
+    assert found["off_path.n_targets"] == 38 and found["off_path.n_left_out"] == 2
+    json.dumps(found, allow_nan=False)
+
+
+def test_passes_are_counted_to_the_first_below(results):
+    table = tables.passes(results)
+    assert table["config1 to 5 %"].tolist() == [2, 1, 1, 1, 1, 1]
+    assert table["config1 to 2 %"].isna().all()
+    assert "1.50 to 1.50 times" in notes.passes(results)[0]
+
+
+def test_the_study_shows_median_and_spread(results):
+    table = tables.study(results, "n_hidden")
+    assert table["hidden neurons"].tolist() == [2, 5]
+    assert table["median total error (%)"].tolist() == [6.0, 2.0]
+    assert table["largest (%)"].tolist() == [10.0, 3.0]
+    text = " ".join(notes.study(results, "n_hidden"))
+    assert "hidden neurons 5." in text and "1 of 5 trainings ended with non_finite" in text
+
+
+def test_notes_of_the_two_configurations_follow_the_errors(results):
+    text = " ".join(notes.total_errors(results))
+    assert "config1 is the more precise for joints 1, 2, 3, 4, 5, 6 (6 of 6)" in text
+    assert "the networks of config1 (1.000 %) and another trainer" in text
+    worse = results.path_errors.copy()
+    swap = {"config1": "config2", "config2": "config1"}
+    worse["method"] = worse["method"].replace(swap)
+    text = " ".join(notes.total_errors(dataclasses.replace(results, path_errors=worse)))
+    assert "config2 is the more precise for every joint (means 2.00 % and 1.00 %)" in text
+
+
+def test_targets_left_out_are_told(results):
+    text = " ".join(notes.off_path(results))
+    assert "2 targets at 20 mm are left out" in text
+    assert "config1_refined_3: reaches all targets up to 20 mm" in text
+    far = results.off_path.copy()
+    far.loc[(far["distance"] > 0.0) & (far["method"] == "config1"), "within_limits"] = 0
+    text = " ".join(notes.off_path(dataclasses.replace(results, off_path=far)))
+    assert "config1_refined_3: reaches all targets up to 0 mm" in text
+    success = tables.off_path_success(results).set_index("method")
+    assert success.loc["config1"].tolist() == [0.0, 0.0]
+    assert success.loc["config1_refined_3"].tolist() == [100.0, 100.0]
+
+
+def test_times_stand_beside_the_methods_they_were_measured_for(results):
+    table = tables.whole_workspace(results).set_index("method")
+    assert table.loc[WHOLE, "single (us)"] == 40.0
+    assert np.isnan(table.loc[EXACT, "single (us)"])
+    assert table.loc["opw", "batched (us)"] == 9.0
+    assert np.isnan(table.loc["opw", "mean position (mm)"])
+
+
+@pytest.mark.parametrize(
+    ("value", "power"), [(0.0, 1e-9), (3e-16, 1e-9), (2e-5, 1e-4), (0.5, 1.0), (20.0, 100.0)]
+)
+def test_round_off_is_told_by_a_power_of_ten(value, power):
+    assert notes._power_above(value) == pytest.approx(power)
+
+
+def test_the_report_is_whole_linked_and_the_same_again(results, tmp_path):
+    published = tmp_path / "total_errors.csv"
+    published.write_text("joint,config1,config2\n")
+    for folder in ("one", "other"):
+        write_report(results, tmp_path / folder, [published])
+    files = sorted(p.relative_to(tmp_path / "one") for p in (tmp_path / "one").rglob("*.*"))
+    page = (tmp_path / "one/README.md").read_text()
+    for file in files:
+        one, other = (tmp_path / folder / file for folder in ("one", "other"))
+        assert one.read_bytes() == other.read_bytes(), file
+        if file.suffix in (".csv", ".png"):
+            assert f"({file.as_posix()})" in page, file
+    assert len([file for file in files if file.suffix == ".png"]) == 9
+    assert "not available" in page and " nan " not in page
+    assert JOINTS[0] not in page
