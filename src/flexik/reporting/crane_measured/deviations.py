@@ -141,9 +141,10 @@ def point_notes(table: pd.DataFrame) -> list[str]:
     turns = forces.lt(0).any(axis=1) & forces.gt(0).any(axis=1)
     if turns.any() and not turns.all():
         notes.append(
-            f"Where the load turns that force, in {_points(table.loc[turns, 'point'])}, play changes "
-            f"sides: loaded, the compensated tip lies {table.loc[turns, MOVED].mean():.1f} mm from "
-            f"the point of reference, elsewhere {table.loc[~turns, MOVED].mean():.1f} mm."
+            f"Where the load turns that force, in {_points(table.loc[turns, 'point'])}, play "
+            "changes sides: loaded, the compensated tip lies "
+            f"{table.loc[turns, MOVED].mean():.1f} mm from the point of reference, elsewhere "
+            f"{table.loc[~turns, MOVED].mean():.1f} mm."
         )
     worse = table["worse with, from reference (%)"] >= 50.0
     note = (
