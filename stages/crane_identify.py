@@ -58,9 +58,11 @@ def main() -> None:
     nominal = flexible_crane(crane, stiffness)
     offsets, found, points = None, pd.DataFrame(), pd.DataFrame()
     if campaign[STROKES[0]].notna().all() and len(campaign) >= FEWEST:
-        offsets = identify(nominal, network, measurements(campaign), settings)
-        found = offset_table(offsets, settings)
         points = predictions(nominal, network, campaign, settings)
+        used = campaign[points["used"].to_numpy() == 1]
+        used = used if len(used) >= FEWEST else campaign
+        offsets = identify(nominal, network, measurements(used), settings)
+        found = offset_table(offsets, settings)
     adapted = None
     if offsets is not None:
         adapted = Adapted(nominal, network, offsets, adaptation.n_corrections)
@@ -74,11 +76,9 @@ def main() -> None:
     if offsets is None:
         print("the campaign has no strokes, or too few rows: nothing is identified")
     else:
-        errors = 1e3 * points[["nominal_error", "adapted_error"]].mean()
-        print(
-            "measured points, mean distance from the prediction: "
-            f"nominal {errors.iloc[0]:.1f} mm, adapted {errors.iloc[1]:.1f} mm"
-        )
+        used = f"{points['used'].sum()} of {len(points)} measurements are used"
+        error = 1e3 * points["nominal_error"].mean()
+        print(f"{used}; mean distance from the nominal crane {error:.1f} mm")
 
 
 def offset_table(offsets: Offsets, settings: AdaptationSettings) -> pd.DataFrame:

@@ -17,12 +17,11 @@ import pandas as pd
 from flexik import parameters, stage
 from flexik.datasets.crane.grid import STROKES
 from flexik.datasets.crane.provenance import campaign_checksum
-from flexik.datasets.crane_measured.campaign import read_campaign
 from flexik.datasets.crane_measured.fields import MEASURED_FIELDS
+from flexik.datasets.crane_measured.own import own_campaign
 from flexik.datasets.tables import write_table
-from flexik.errors import DataError
 from flexik.evaluation.conditions import all_conditions
-from flexik.mechanisms.crane import CraneGeometry, smallest_extension
+from flexik.mechanisms.crane import CraneGeometry
 from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
 from flexik.multibody.crane_measured.as_built import Magnitudes, as_built_tips, draw_twin
 from flexik.parameters import load_parameters
@@ -30,8 +29,6 @@ from flexik.positioning.crane.initial import initial_positions
 from flexik.positioning.crane.trained import trained_method
 
 FOLDER = Path("data/crane")
-# a sensor may say a little beyond the ends of its cylinder, m
-STROKE_TOLERANCE = 0.01
 
 
 def main() -> None:
@@ -50,34 +47,6 @@ def main() -> None:
         campaign_checksum(crane, stiffness),
     )
     print(f"{len(table)} measurements, {crane.measured.source.replace('_', ' ')}")
-
-
-def own_campaign(file: str, geometry: CraneGeometry) -> pd.DataFrame:
-    """Campaign in `file`, with NaN and no text for what it leaves out.
-
-    Raises DataError if a target is not reached or a stroke is beyond its cylinder.
-    """
-    table = read_campaign(file)
-    if "method" in table:
-        targets = table[["target_x", "target_y"]].to_numpy()
-        missed = np.isnan(smallest_extension(geometry, targets))
-        if missed.any():
-            x, y = targets[missed][0]
-            raise DataError(f"{file}: the rigid crane does not reach the target ({x:g}, {y:g}) m")
-    if STROKES[0] in table:
-        for name, longest in zip(STROKES, geometry.stroke_maximum, strict=True):
-            beyond = ~table[name].between(-STROKE_TOLERANCE, longest + STROKE_TOLERANCE)
-            if beyond.any():
-                raise DataError(
-                    f"{file}: {name} {table.loc[beyond, name].iloc[0]:g} m, "
-                    f"expected 0 to {longest:g} m"
-                )
-    unknown = {
-        field.name: "" if field.dtype == "string" else np.nan
-        for field in MEASURED_FIELDS
-        if field.name not in table
-    }
-    return table.assign(**unknown)
 
 
 def as_built(crane: parameters.Crane, stiffness: float) -> pd.DataFrame:
@@ -104,7 +73,8 @@ def as_built(crane: parameters.Crane, stiffness: float) -> pd.DataFrame:
             "measured_y": tip[:, 1],
         }
         tables.append(pd.DataFrame(columns))
-    return pd.concat(tables)
+    table = pd.concat(tables)
+    return table.assign(line=np.arange(1, len(table) + 1))
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ without_worst_points, inversions, tolerance_study, query_cost, workspace, measur
 measured_reference_errors, measured_points, error_budget, measured_predictions, identified_offsets,
 adaptation, calibration, mesh_study, training, training_race, size_rules and size_selection/ (CSV
 and Markdown), errors.csv with every test condition of every method, adapted_strokes.csv,
-metrics.json, figures/ and README.md.
+measured_distances.csv, metrics.json, figures/ and README.md.
 """
 
 from pathlib import Path

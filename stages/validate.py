@@ -1,7 +1,7 @@
 """Check params.yaml before any other stage runs, and remove results of names it no longer has.
 
 DVC deletes the outputs of a stage before running it, so a wrong value must be found before.
-Reads params.yaml. Writes data/validated.txt, whose content never changes.
+Reads params.yaml and the files it names. Writes data/validated.txt, whose content never changes.
 """
 
 import shutil
@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from flexik import parameters, stage
+from flexik.datasets.crane_measured.own import own_campaign
 from flexik.datasets.fanuc.samples import taught_path
 from flexik.errors import DataError, FlexikError, ParameterError
 from flexik.files import write_text
@@ -40,7 +41,7 @@ def main() -> None:
 
 
 def check_crane(crane: parameters.Crane) -> None:
-    """Section tables are there, the linkage closes, every test point is reached."""
+    """Section tables are there, the linkage closes, points are reached, a campaign can be read."""
     geometry = CraneGeometry(**crane.geometry.model_dump())
     try:
         flexible_crane(crane, 1.0)
@@ -50,22 +51,32 @@ def check_crane(crane: parameters.Crane) -> None:
         check_assembly(geometry)
     except ParameterError as error:
         raise ParameterError(f"params.yaml: crane.geometry: {error}") from None
-    points = np.array(crane.evaluation.points)
-    missed = np.isnan(smallest_extension(geometry, points))
-    if missed.any():
-        number = int(np.argmax(missed))
-        x, y = points[number]
-        raise ParameterError(
-            f"params.yaml: crane.evaluation.points.{number}: the rigid crane does not reach "
-            f"({x:g}, {y:g}) m" + (f", nor {missed.sum() - 1} others" if missed.sum() > 1 else "")
+    for key, section in (("evaluation", crane.evaluation), ("measured", crane.measured)):
+        points = np.array(section.points)
+        missed = np.isnan(smallest_extension(geometry, points))
+        if missed.any():
+            number = int(np.argmax(missed))
+            x, y = points[number]
+            others = f", nor {missed.sum() - 1} others" if missed.sum() > 1 else ""
+            raise ParameterError(
+                f"params.yaml: crane.{key}.points.{number}: the rigid crane does not reach "
+                f"({x:g}, {y:g}) m{others}"
+            )
+    for key, area in (
+        ("workspace", crane.workspace),
+        ("measured.adaptation", crane.measured.adaptation),
+    ):
+        raster = np.array(
+            [(x, y) for x in np.linspace(*area.x, 60) for y in np.linspace(*area.y, 60)]
         )
-    space = crane.workspace
-    raster = np.array(
-        [(x, y) for x in np.linspace(*space.x, 60) for y in np.linspace(*space.y, 60)]
-    )
-    raster = raster[raster[:, 0] >= crane.grid.minimum_tip_x]
-    if np.isnan(smallest_extension(geometry, raster)).all():
-        raise ParameterError("params.yaml: crane.workspace: the crane reaches nothing in x, y")
+        raster = raster[raster[:, 0] >= crane.grid.minimum_tip_x]
+        if np.isnan(smallest_extension(geometry, raster)).all():
+            raise ParameterError(f"params.yaml: crane.{key}: the crane reaches nothing in x, y")
+    if crane.measured.source == "file":
+        try:
+            own_campaign(crane.measured.file, geometry)
+        except DataError as error:
+            raise DataError(f"params.yaml: crane.measured.file: {error}") from None
 
 
 def check_fanuc(fanuc: parameters.Fanuc) -> None:

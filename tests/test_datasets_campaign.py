@@ -46,7 +46,7 @@ def read(tmp_path):
 def test_positioning_campaign(read):
     frame = read(GOOD)
     assert list(frame.columns) == [
-        *("method", "target_x", "target_y", "payload", "measured_x", "measured_y")
+        *("line", "method", "target_x", "target_y", "payload", "measured_x", "measured_y")
     ]
     assert frame["method"].tolist() == ["none", "combined"] * 2
     np.testing.assert_array_equal(frame["payload"], [0, 0, 86, 86])
@@ -56,22 +56,22 @@ def test_positioning_campaign(read):
 
 def test_a_strokes_only_campaign_may_repeat_a_pose(read):
     frame = read(STROKES)
-    names = ["payload", "lift_stroke", "jib_stroke", "extension_stroke", "measured_x", "measured_y"]
-    assert list(frame.columns) == names
+    strokes = ["lift_stroke", "jib_stroke", "extension_stroke"]
+    assert list(frame.columns) == ["line", "payload", *strokes, "measured_x", "measured_y"]
     np.testing.assert_array_equal(frame["measured_y"], [1.2, 1.21])
 
 
 def test_order_of_columns_line_ends_and_byte_order_mark_do_not_matter(read):
     lines = [line.split(",") for line in GOOD.splitlines() if line and line[0] != "#"]
     turned = "\r\n".join(",".join(reversed(cells)) for cells in lines)
-    assert read(turned, "utf-8-sig").equals(read(GOOD))
+    whole = read(turned, "utf-8-sig").drop(columns="line")
+    assert whole.equals(read(GOOD).drop(columns="line"))
 
 
 def test_example_gives_both_tables():
     campaign = read_campaign(EXAMPLE)
-    assert list(campaign.columns) == [
-        name.removesuffix("_kg").removesuffix("_m") for name in COLUMNS
-    ]
+    plain = [name.removesuffix("_kg").removesuffix("_m") for name in COLUMNS]
+    assert list(campaign.columns) == ["line", *plain]
     frames = split_campaign(campaign)
     assert len(frames["none"]) == len(frames["combined"]) == 27
     targets = set(zip(campaign["target_x"], campaign["target_y"], strict=True))

@@ -64,7 +64,8 @@ def test_budget_statistics_are_means_of_a_crane(budget):
 
 
 def test_shares_count_the_cranes_that_compensation_makes_worse(budget):
-    table = worse_shares(budget)
+    table = worse_shares(budget, "all")
     assert table[["target_x", "target_y"]].to_numpy().tolist() == [[2.0, 1.0], [3.0, 1.0]]
     np.testing.assert_allclose(table["error"], [0.0, 1 / 3])
     np.testing.assert_allclose(table["reference_error"], [0.0, 1 / 3])
+    assert worse_shares(budget, "none").empty

@@ -77,7 +77,7 @@ def drawn_offsets(seed, size=1.0):
     values = {name: size * generator.normal(0.0, deviation[name]) for name in OFFSETS}
     for name in PLAYS:
         values[name] += SETTINGS.play
-    return Offsets(values, dict.fromkeys(OFFSETS, 0.0))
+    return Offsets(values)
 
 
 def tips_with(crane, network, offsets, strokes, payload):
@@ -186,14 +186,14 @@ def test_a_softer_spring_gives_way_as_the_flexible_crane_does(crane):
 def test_factors_scale_deflection_and_spring(crane, network):
     values = dict.fromkeys(OFFSETS, 0.0) | {"deflection": 0.05, "spring": -0.2}
     inputs = np.column_stack([POSES, LOADS])
-    found = CorrectedDeflection(crane, network, Offsets(values, {})).predict(inputs)
+    found = CorrectedDeflection(crane, network, Offsets(values)).predict(inputs)
     spring = compliance(crane, POSES, LOADS).spring
     assert found == pytest.approx(1.05 * network.predict(inputs) - 0.2 * spring, abs=1e-15)
 
 
 def test_true_offsets_put_the_tip_on_the_target(crane, network):
     offsets = drawn_offsets(1)
-    tight = Offsets({n: 0.0 if n in PLAYS else v for n, v in offsets.values.items()}, {})
+    tight = Offsets({n: 0.0 if n in PLAYS else v for n, v in offsets.values.items()})
     method = Adapted(crane, network, tight, n_corrections=6)
     assert mean_error(method, crane, network, tight, np.random.default_rng(1)) < 1e-6
     # with play a few targets lie in the gap where a joint's force changes its sign
@@ -203,7 +203,7 @@ def test_true_offsets_put_the_tip_on_the_target(crane, network):
 
 def test_expected_offsets_measured_without_error_stay(crane, network):
     values = {name: SETTINGS.play if name in PLAYS else 0.0 for name in OFFSETS}
-    expected = Offsets(values, dict.fromkeys(OFFSETS, 0.0))
+    expected = Offsets(values)
     exact = replace(SETTINGS, measurement=1e-9)
     points = measured(crane, network, expected, np.random.default_rng(2), 9)
     tip = tips_with(crane, network, expected, points.strokes, points.payload)
@@ -221,7 +221,7 @@ def test_identified_offsets_are_the_most_probable(crane, network):
     scale = np.array([deviation[name] for name in OFFSETS])  # nothing measured: the prior
 
     def cost(changed):
-        offsets = Offsets(dict(zip(OFFSETS, changed, strict=True)), {})
+        offsets = Offsets(dict(zip(OFFSETS, changed, strict=True)))
         missed = points.tip - tips_with(crane, network, offsets, points.strokes, points.payload)
         expected = np.array([SETTINGS.play if name in PLAYS else 0.0 for name in OFFSETS])
         prior = np.sum(((changed - expected) / scale) ** 2)

@@ -8,7 +8,7 @@ import pytest
 from smoke_pipeline import ROOT
 
 from flexik.datasets.crane.grid import STROKES
-from flexik.evaluation.crane_measured.predictions import measurements, predictions
+from flexik.evaluation.crane_measured.predictions import measurements, misfit, outliers, predictions
 from flexik.mechanisms.crane import forward, inverse_with_smallest_extension
 from flexik.multibody.crane.assembly import flexible_crane
 from flexik.parameters import load_parameters
@@ -18,10 +18,10 @@ from flexik.positioning.crane_measured.adapted import (
     CorrectedDeflection,
     Measurements,
     Offsets,
-    predicted_tip,
+    identify,
     prior,
-    surprise,
 )
+from flexik.positioning.crane_measured.prediction import predicted_tip, surprise
 
 SETTINGS = AdaptationSettings(
     measurement=0.5e-3,
@@ -62,8 +62,7 @@ def drawn(seed):
     """Offsets of a crane as the settings expect it."""
     expected, deviation = prior(SETTINGS)
     values = np.random.default_rng(seed).normal(expected, deviation)
-    names = dict(zip(OFFSETS, values.tolist(), strict=True))
-    return Offsets(names, dict.fromkeys(OFFSETS, 0.0))
+    return Offsets(dict(zip(OFFSETS, values.tolist(), strict=True)))
 
 
 def measured(crane, conditions, seed):
@@ -80,7 +79,7 @@ def test_predicted_tips_are_rigid_tips_and_deflections(crane, conditions):
     inputs = np.column_stack([strokes, payload])
     nominal = predicted_tip(crane, Sag(), None, strokes, payload)
     np.testing.assert_allclose(nominal, forward(crane.geometry, strokes) + Sag().predict(inputs))
-    zero = Offsets(dict.fromkeys(OFFSETS, 0.0), dict.fromkeys(OFFSETS, 0.0))
+    zero = Offsets(dict.fromkeys(OFFSETS, 0.0))
     np.testing.assert_allclose(predicted_tip(crane, Sag(), zero, strokes, payload), nominal)
     offsets = drawn(3)
     found = predicted_tip(crane, Sag(), offsets, strokes, payload)
@@ -96,6 +95,32 @@ def test_surprise_is_in_standard_deviations(crane, conditions):
         for seed in range(60)
     ]
     assert np.mean(squares) == pytest.approx(2.0, rel=0.2)
+
+
+def test_surprise_after_identification_is_in_its_own_standard_deviations(crane, conditions):
+    first, rest = slice(0, 4), slice(4, None)
+    squares = []
+    for seed in range(60):
+        whole = measured(crane, conditions, seed)
+        known, other = (
+            Measurements(whole.strokes[rows], whole.payload[rows], whole.tip[rows])
+            for rows in (rest, first)
+        )
+        offsets = identify(crane, Sag(), known, SETTINGS)
+        squares.append(surprise(crane, Sag(), other, SETTINGS, offsets) ** 2)
+    assert np.mean(squares) == pytest.approx(2.0, rel=0.3)
+
+
+def test_what_stands_out_is_judged_by_the_median():
+    generator = np.random.default_rng(1)
+    distance = np.linalg.norm(generator.standard_normal((2000, 2)), axis=1)
+    assert misfit(3.0 * distance) == pytest.approx(3.0, rel=0.05)
+    assert misfit(0.1 * distance) == 1.0
+    few = distance[:50]
+    assert not outliers(few, few).any()
+    assert outliers(np.append(few, 9.0), few).tolist() == [False] * 50 + [True]
+    # where all fit badly, none of them stands out
+    assert not outliers(10.0 * few, 10.0 * few).any()
 
 
 def test_a_slip_of_the_pen_surprises(crane, conditions):
@@ -118,14 +143,20 @@ def test_who_misjudges_expects_less():
 def campaign(crane, conditions):
     rows = measured(crane, conditions, 2)
     targets = np.repeat(TARGETS, 2, axis=0)
-    columns = {"target_x": targets[:, 0], "target_y": targets[:, 1], "payload": rows.payload}
+    columns = {
+        "line": np.arange(1, 13),
+        "target_x": targets[:, 0],
+        "target_y": targets[:, 1],
+        "payload": rows.payload,
+    }
     columns |= dict(zip(STROKES, rows.strokes.T, strict=True))
     return pd.DataFrame(columns | {"measured_x": rows.tip[:, 0], "measured_y": rows.tip[:, 1]})
 
 
 def test_a_target_is_predicted_from_the_others_alone(crane, campaign):
     table = predictions(crane, Sag(), campaign, SETTINGS)
-    assert table["measurement"].tolist() == list(range(1, 13))
+    assert table["line"].tolist() == list(range(1, 13))
+    assert (table["used"] == 1).all()
     strokes, payload = campaign[list(STROKES)].to_numpy(), campaign["payload"].to_numpy()
     nominal = predicted_tip(crane, Sag(), None, strokes, payload)
     away = np.linalg.norm(campaign[["measured_x", "measured_y"]] - nominal, axis=1)
@@ -139,6 +170,7 @@ def test_a_target_is_predicted_from_the_others_alone(crane, campaign):
     assert change[:2].min() > 0.04
     assert (change[2:] > 1e-6).any()
     # strokes tell the groups where there are no targets
+    assert predictions(crane, Sag(), moved, SETTINGS)["used"].tolist() == [0, 0, *[1] * 10]
     unknown = campaign.assign(target_x=np.nan, target_y=np.nan)
     pd.testing.assert_frame_equal(predictions(crane, Sag(), unknown, SETTINGS), table)
 

@@ -109,4 +109,6 @@ class Measured(Model):
     def _without_load(self) -> Self:
         if 0.0 not in self.payloads:
             raise ValueError("payloads: expected 0, the reference of the errors, among them")
+        if not any(self.payloads):
+            raise ValueError("payloads: expected a load beside 0")
         return self

@@ -53,9 +53,10 @@ def read_campaign(path: Path | str) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns of the file without their units (payload in kg, the others in m), in the order
-        method, target_x, target_y, payload, lift_stroke, jib_stroke, extension_stroke, measured_x,
-        measured_y; those of a missing group are absent. Rows in the order of the file.
+        Columns line (of the file) and those of the file without their units (payload in kg, the
+        others in m), in the order method, target_x, target_y, payload, lift_stroke, jib_stroke,
+        extension_stroke, measured_x, measured_y; those of a missing group are absent. Rows in the
+        order of the file.
 
     Raises
     ------
@@ -87,7 +88,7 @@ def read_campaign(path: Path | str) -> pd.DataFrame:
     if "method" in frame:
         _check_positioning(path, frame)
     _check_repeated(path, frame, list(frame.columns))
-    return frame.reset_index(drop=True)
+    return frame.reset_index(names="line")
 
 
 def _split(path: Path | str) -> tuple[tuple[int, list[str]], Rows]:

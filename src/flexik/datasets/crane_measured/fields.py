@@ -8,6 +8,7 @@ ADAPTED, MISJUDGED = "adapted", "misjudged"
 
 # A campaign of one's own may lack targets and methods, or strokes: NaN and no text
 MEASURED_FIELDS = (
+    Field("line", "1", "of the file; of this table, from 1, where there is none", "int64"),
     Field("method", "1", "none or combined", "string"),
     *CONDITION_FIELDS[1:7],
     Field("measured_x", "m", "where the tip came to rest, forward of the slew axis"),
@@ -39,13 +40,13 @@ OFFSET_FIELDS = (
     Field("deviation", "1", "standard deviation after measuring, in its unit"),
 )
 PREDICTION_FIELDS = (
-    Field("measurement", "1", "number in the campaign, from 1", "int64"),
-    Field("payload", "kg", "point mass at the tip"),
-    Field("measured_x", "m", "where the tip came to rest, forward of the slew axis"),
-    Field("measured_y", "m", "where the tip came to rest, above ground"),
-    Field("surprise", "1", "distance from the nominal prediction in expected standard deviations"),
+    MEASURED_FIELDS[0],
+    *(field for field in MEASURED_FIELDS if field.name in ("payload", "measured_x", "measured_y")),
     Field("nominal_error", "m", "distance from the prediction of the nominal crane"),
     Field("adapted_error", "m", "from that of a crane adapted to the other targets; NaN: too few"),
+    Field("surprise", "1", "distance from what was expected, in standard deviations"),
+    Field("left_out_surprise", "1", "from the adapted crane, in its own standard deviations"),
+    Field("used", "1", "1; 0: it stands out and identifies nothing", "int64"),
 )
 COMMAND_FIELDS = (
     *CONDITION_FIELDS[1:4],

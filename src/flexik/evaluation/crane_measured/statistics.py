@@ -68,10 +68,10 @@ def budget_statistics(budget: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(columns).reset_index()
 
 
-def worse_shares(budget: pd.DataFrame) -> pd.DataFrame:
-    """Share of the cranes with all deviations on which compensation makes a point worse.
+def worse_shares(budget: pd.DataFrame, deviation: str) -> pd.DataFrame:
+    """Share of the cranes on which compensation makes a point worse.
 
-    By the mean error of the point over its payloads.
+    By the mean error of the point over its payloads; cranes with `deviation` (all, none, ...).
 
     Returns
     -------
@@ -79,7 +79,7 @@ def worse_shares(budget: pd.DataFrame) -> pd.DataFrame:
         Columns target_x, target_y, error and reference_error: the shares by either error; from the
         points of reference over the payloads but the lightest, which is the reference itself.
     """
-    rows = budget[budget["deviation"] == "all"]
+    rows = budget[budget["deviation"] == deviation]
     loaded = rows[rows["payload"] > rows["payload"].min()]
     found = {}
     for error, kept in zip(ERRORS, (rows, loaded), strict=True):

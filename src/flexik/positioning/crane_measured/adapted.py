@@ -7,7 +7,7 @@ Rouvinen 1999, who met these differences in chapter 4.6.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -76,13 +76,11 @@ class AdaptationSettings:
     spring: float
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            least = 0.0 if field.name in ("repeatability", "stroke_offset", "play") else None
+        for setting in fields(self):
+            name, value = setting.name, getattr(self, setting.name)
+            least = 0.0 if name in ("repeatability", "stroke_offset", "play") else None
             if not (np.isfinite(value) and (value > 0.0 or value == least)):
-                raise ParameterError(
-                    f"adaptation: {field.name}={value}, expected a positive number"
-                )
+                raise ParameterError(f"adaptation: {name}={value}, expected a positive number")
 
     def misjudged(self, share: float) -> "AdaptationSettings":
         """What one expects who takes a crane for newer: no play, `share` of every deviation."""
@@ -96,11 +94,19 @@ class Offsets:
     """Identified differences from the nominal crane, by name of OFFSETS.
 
     values : m for dimensions and the clearance of a joint's pins; relative for the factors.
-    deviations : standard deviations that measurements and expectation leave.
+    covariance : (n_offsets, n_offsets), what measurements and expectation leave; zero: exact.
     """
 
     values: Mapping[str, float]
-    deviations: Mapping[str, float]
+    covariance: Array = field(
+        default_factory=lambda: np.zeros((len(OFFSETS), len(OFFSETS))), compare=False
+    )
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """Standard deviations by name of OFFSETS."""
+        roots = np.sqrt(np.diag(self.covariance)).tolist()
+        return dict(zip(OFFSETS, roots, strict=True))
 
     def geometry(self, nominal: CraneGeometry) -> CraneGeometry:
         """`nominal` with the dimensions corrected."""
@@ -121,55 +127,14 @@ def identify(
     Raises
     ------
     PositioningError
-        Naming the row whose strokes some crane near the nominal one cannot take.
+        Naming the row whose strokes some crane near the nominal one cannot take; or if no crane
+        near it fits the measurements.
     """
-    _closed_tip(crane.geometry, measurements.strokes)
+    closed_tip(crane.geometry, measurements.strokes)
     offsets, _ = prior(settings)
     for _ in range(N_ROUNDS):
         offsets, left = _most_probable(crane, network, measurements, settings, offsets)
-    return Offsets(
-        dict(zip(OFFSETS, offsets.tolist(), strict=True)),
-        dict(zip(OFFSETS, left.tolist(), strict=True)),
-    )
-
-
-def predicted_tip(
-    crane: FlexibleCrane,
-    network: Network,
-    offsets: Offsets | None,
-    strokes: Array,
-    payload: Array,
-) -> Array:
-    """Tip (n, 2) in m at `strokes` (n, 3) in m under `payload` (n,) in kg.
-
-    offsets : of the nominal `crane` whose deflection `network` predicts; None: there are none.
-    """
-    inputs = np.column_stack([strokes, payload])
-    if offsets is None:
-        return forward(crane.geometry, strokes) + network.predict(inputs)
-    deflection = CorrectedDeflection(crane, network, offsets).predict(inputs)
-    return forward(offsets.geometry(crane.geometry), strokes) + deflection
-
-
-def surprise(
-    crane: FlexibleCrane, network: Network, measurements: Measurements, settings: AdaptationSettings
-) -> Array:
-    """Distance (n,) of each measured tip from what was expected, in standard deviations.
-
-    Expected is the nominal `crane` with the usual play; the covariance is that of the offsets, of
-    measuring and of repeatability. So a slip of the pen shows before anything is identified.
-    """
-    expected, deviation = prior(settings)
-    n_dimensions = len(DIMENSIONS)
-    tip = _closed_tip(crane.geometry, measurements.strokes)
-    share, fixed = _displacements(crane, network, measurements.strokes, measurements.payload)
-    residual = measurements.tip - tip - fixed - share @ expected[n_dimensions:]
-    slope = _slope(crane.geometry, expected[:n_dimensions], measurements.strokes)
-    whitening = _whitening(crane, measurements, settings)
-    spread = whitening @ np.concatenate([slope, share], axis=2) * deviation
-    covariance = spread @ spread.transpose(0, 2, 1) + np.eye(2)
-    white = (whitening @ residual[..., None])[..., 0]
-    return np.sqrt(np.einsum("ni,nij,nj->n", white, np.linalg.inv(covariance), white))
+    return Offsets(dict(zip(OFFSETS, offsets.tolist(), strict=True)), left)
 
 
 @dataclass(frozen=True)
@@ -183,7 +148,7 @@ class CorrectedDeflection:
     def predict(self, values: Array) -> Array:
         """Displacement (n, 2) in m at `values` (n, 4): strokes in m and payload in kg."""
         crane = replace(self.crane, geometry=self.offsets.geometry(self.crane.geometry))
-        share, fixed = _displacements(crane, self.network, values[:, :3], values[:, 3])
+        share, fixed = displacements(crane, self.network, values[:, :3], values[:, 3])
         return fixed + share @ np.array([self.offsets.values[name] for name in (*PLAYS, *FACTORS)])
 
 
@@ -230,31 +195,34 @@ def _most_probable(
     settings: AdaptationSettings,
     start: Array,
 ) -> tuple[Array, Array]:
-    """Offsets and deviations, (n_offsets,) each, with the joint forces of the offsets `start`."""
+    """Offsets (n_offsets,) and their covariance, with the joint forces of the offsets `start`."""
     expected, deviation = prior(settings)
     strokes, n_dimensions = measurements.strokes, len(DIMENSIONS)
     known = replace(crane, geometry=corrected(crane.geometry, start[:n_dimensions]))
-    share, fixed = _displacements(known, network, strokes, measurements.payload)
-    whitening = _whitening(known, measurements, settings)
+    share, fixed = displacements(known, network, strokes, measurements.payload)
+    white = whitening(known, measurements, settings)
     offsets = start
     for _ in range(N_ITERATIONS):
         dimensions = offsets[:n_dimensions]
-        tip = _closed_tip(corrected(crane.geometry, dimensions), strokes)
+        tip = closed_tip(corrected(crane.geometry, dimensions), strokes)
         residual = measurements.tip - tip - fixed - share @ offsets[n_dimensions:]
-        slope = _slope(crane.geometry, dimensions, strokes)
-        slopes = whitening @ np.concatenate([slope, share], axis=2) * deviation
+        by_dimension = slope(crane.geometry, dimensions, strokes)
+        slopes = white @ np.concatenate([by_dimension, share], axis=2) * deviation
         system = np.concatenate([slopes.reshape(-1, len(OFFSETS)), np.eye(len(OFFSETS))])
         right = np.concatenate(
-            [(whitening @ residual[..., None]).ravel(), (expected - offsets) / deviation]
+            [(white @ residual[..., None]).ravel(), (expected - offsets) / deviation]
         )
         step = np.linalg.lstsq(system, right, rcond=None)[0]
         offsets = offsets + deviation * step
-        if np.abs(step).max() < TOLERANCE:
-            break
-    return offsets, deviation * np.sqrt(np.diag(np.linalg.inv(system.T @ system)))
+        if not np.isnan(step).any() and np.abs(step).max() < TOLERANCE:
+            return offsets, np.outer(deviation, deviation) * np.linalg.inv(system.T @ system)
+    raise PositioningError(
+        "measurements: no crane near the nominal one fits them, expected tips within centimetres "
+        "of where the strokes put the nominal crane"
+    )
 
 
-def _displacements(
+def displacements(
     crane: FlexibleCrane, network: Network, strokes: Array, payload: Array
 ) -> tuple[Array, Array]:
     """Displacement (n, 2, 8) per unit of PLAYS and FACTORS, and the nominal one (n, 2)."""
@@ -264,7 +232,7 @@ def _displacements(
     return np.concatenate([play, deflection[..., None], spring[..., None]], axis=2), deflection
 
 
-def _closed_tip(geometry: CraneGeometry, strokes: Array) -> Array:
+def closed_tip(geometry: CraneGeometry, strokes: Array) -> Array:
     """Rigid tips (n, 2); raises PositioningError where the linkage does not close."""
     tip = forward(geometry, strokes)
     if (broken := np.isnan(tip).any(axis=1)).any():
@@ -275,7 +243,7 @@ def _closed_tip(geometry: CraneGeometry, strokes: Array) -> Array:
     return tip
 
 
-def _slope(geometry: CraneGeometry, dimensions: Array, strokes: Array) -> Array:
+def slope(geometry: CraneGeometry, dimensions: Array, strokes: Array) -> Array:
     """Derivative (n, 2, 20) of the rigid tip with respect to DIMENSIONS."""
     steps = STEP * np.eye(len(dimensions))
     columns = [
@@ -286,7 +254,7 @@ def _slope(geometry: CraneGeometry, dimensions: Array, strokes: Array) -> Array:
     return np.stack(columns, axis=-1) / (2 * STEP)
 
 
-def _whitening(
+def whitening(
     crane: FlexibleCrane, measurements: Measurements, settings: AdaptationSettings
 ) -> Array:
     """Inverse square roots (n, 2, 2), in 1/m, of the scatter of the measured tips.
@@ -299,11 +267,11 @@ def _whitening(
         forward(crane.geometry, strokes + step) - forward(crane.geometry, strokes - step)
         for step in STEP * np.eye(3)
     ]
-    slope = settings.repeatability * np.stack(columns, axis=-1) / (2 * STEP)
+    by_stroke = settings.repeatability * np.stack(columns, axis=-1) / (2 * STEP)
     doubt = np.array([0.0, np.hypot(settings.length, settings.stroke_offset), 0.0])
     for shifted in (strokes - doubt, strokes + doubt):
-        _closed_tip(crane.geometry, shifted)
+        closed_tip(crane.geometry, shifted)
     less, more = (compliance(crane, strokes + d, payload).play.sum(axis=2) for d in (-doubt, doubt))
-    scatter = np.concatenate([slope, settings.play * (more - less)[..., None] / 2], axis=2)
+    scatter = np.concatenate([by_stroke, settings.play * (more - less)[..., None] / 2], axis=2)
     covariance = scatter @ scatter.transpose(0, 2, 1) + settings.measurement**2 * np.eye(2)
     return np.linalg.inv(np.linalg.cholesky(covariance))

@@ -132,9 +132,8 @@ def write(measured: Measured, crane: FlexibleCrane, payload_minimum: float, fold
     reference = measured.published["measured_reference_errors"].set_index("statistic")
     caption = (
         "Mean R over the points and payloads of params.yaml on cranes as built, by deviation. "
-        "`none`: a crane without any, so the noise of measuring and the network's own error; "
-        "its training payloads begin at "
-        f"{payload_minimum:g} kg."
+        "`none`: a crane without any, so that with compensation the noise of measuring and the "
+        f"network's own error are left; its training payloads begin at {payload_minimum:g} kg."
     )
     theirs = float(reference["combined_all"]["mean_error"])
     notes = [deviations.sensitivity_note(measured.budget, theirs)]
@@ -151,8 +150,9 @@ def _write_adaptation(measured: Measured, folder: Path) -> None:
         f"Errors at {settings.n_targets} other targets on each of {settings.n_cranes} cranes as "
         f"built after N measurements; N = 0: methods of the nominal crane, `{settings.method}` the "
         f"one that is adapted. `{MISJUDGED}`: adapted by one who expects no play and "
-        f"{100 * settings.misjudged.share:g} % of the other deviations. The percentile is that of "
-        "the targets of each crane, averaged over the cranes; max R is over everything."
+        f"{100 * settings.misjudged.share:g} % of the other deviations of the crane. The "
+        "percentile is that of the targets of each crane, averaged over the cranes; max R is over "
+        "everything."
     )
     table = campaign_tables.adaptation_table(adaptation_statistics(measured.adaptation))
     tables.write_table(folder / "adaptation", table, 2, caption)
@@ -169,16 +169,19 @@ def _write_identification(measured: Measured, folder: Path) -> None:
     if not len(measured.offsets):
         for name, caption in captions.items():
             _write_absent(folder / name, caption)
+        identification.write_predictions(folder / "measured_distances.csv", measured.predictions)
         return
     table = identification.offset_table(measured.offsets)
-    tables.write_table(folder / "identified_offsets", table, 2, captions["identified_offsets"])
+    tables.write_table(folder / "identified_offsets", table, 3, captions["identified_offsets"])
     tables.write_table(
         folder / "measured_predictions",
         identification.prediction_table(measured.predictions),
         1,
         captions["measured_predictions"],
-        identification.prediction_notes(measured.predictions),
+        identification.prediction_notes(measured.predictions, measured.offsets),
     )
+    path = folder / "measured_distances.csv"
+    identification.write_predictions(path, measured.predictions)
 
 
 def _write_absent(path: Path, caption: str) -> None:
@@ -190,7 +193,7 @@ def _write_figures(measured: Measured, crane: FlexibleCrane, folder: Path) -> No
     for path in folder.glob("measured_*.png"):
         path.unlink()
     statistics = adaptation_statistics(measured.adaptation)
-    unadapted = statistics[statistics["method"] == statistics["method"].iloc[0]]["mean_error"]
+    unadapted = statistics[statistics["method"] == measured.parameters.method]["mean_error"]
     goals = {
         n: goal
         for n, goal in ((HALVES, 0.5 * unadapted.mean()), (GOOD, GOOD_ERROR))
@@ -236,8 +239,9 @@ def target_points(measured: Measured) -> np.ndarray:
 
 def named_points(points: np.ndarray) -> np.ndarray:
     """The two points of figures 4.24 and 4.25, or the last two where those are not measured."""
-    there = [np.isclose(points, point).all(axis=1).any() for point in NAMED_POINTS]
-    return NAMED_POINTS if all(there) else points[-2:]
+    same = [np.isclose(points, point).all(axis=1) for point in NAMED_POINTS]
+    there = [points[rows][0] for rows in same if rows.any()]
+    return np.array(there) if len(there) == len(same) else points[-2:]
 
 
 def section(measured: Measured, folder: Path) -> page.Section:
@@ -261,7 +265,11 @@ def _source_text(measured: Measured) -> str:
             "so single values cannot agree with the published ones, only their order and what "
             "compensation changes."
         )
-    text = f"The measurements are those of `{measured.parameters.file}`."
+    text = (
+        f"The measurements are those of `{measured.parameters.file}`; the published ones beside "
+        "them are of the nine points of the thesis. Points and budget below are those of "
+        "params.yaml, on cranes as built."
+    )
     if not measured.has_targets:
         text += " It has no targets, so there are no tables of errors and no commands."
     return text
@@ -276,7 +284,7 @@ def _adaptation_text(measured: Measured) -> str:
         "crane will leave more. Errors include the repeatability of the strokes. "
     )
     if not len(measured.offsets):
-        return text + "The campaign has no strokes, so nothing is identified from it."
+        return text + "The campaign has no strokes or too few rows: nothing is identified from it."
     if not len(measured.commands):
         return text.rstrip()
     return text + identification.command_text(measured.commands, "adapted_strokes.csv")
@@ -288,15 +296,21 @@ def _figures(measured: Measured, figures: Path) -> list[tuple[Path, str]]:
         return found
     return [
         (figures / "measured_points.png", "Measured points (after figure 4.20)."),
-        (figures / "measured_errors_x.png", "Errors in x from the target (after figure 4.22)."),
-        (figures / "measured_errors_y.png", "Errors in y from the target (after figure 4.22)."),
+        (
+            figures / "measured_errors_x.png",
+            "Errors in x: target minus measured point (after figure 4.22).",
+        ),
+        (
+            figures / "measured_errors_y.png",
+            "Errors in y: target minus measured point; positive: too low (after figure 4.22).",
+        ),
         (
             figures / "measured_reference_errors_x.png",
-            "Errors in x from the reference point (after figure 4.23).",
+            "Errors in x: reference minus measured point (after figure 4.23).",
         ),
         (
             figures / "measured_reference_errors_y.png",
-            "Errors in y from the reference point (after figure 4.23).",
+            "Errors in y: reference minus measured point (after figure 4.23).",
         ),
         *(
             (
