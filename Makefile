@@ -11,7 +11,7 @@ export MKL_NUM_THREADS := 1
 export DVC_NO_ANALYTICS := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: repro smoke test lint benchmark benchmark-training benchmark-positioning benchmark-fanuc setup clean
+.PHONY: repro smoke test lint benchmark benchmark-training benchmark-positioning benchmark-fanuc benchmark-smartee setup clean
 
 repro: $(VENV)/.pipeline ## run the pipeline; only what changed is computed
 	$(BIN)/python stages/validate.py --check
@@ -41,6 +41,9 @@ benchmark-positioning: $(VENV)/.dev ## timings of the positioning methods and of
 benchmark-fanuc: $(VENV)/.dev ## timings of the six-joint arm's methods, and what more training buys
 	$(BIN)/python benchmarks/fanuc.py
 
+benchmark-smartee: $(VENV)/.benchmark ## timings of the SmartEE's direct kinematics and of its trainers
+	$(BIN)/python benchmarks/smartee.py
+
 setup: $(VENV)/.dev ## everything a developer needs
 
 $(VENV)/.python:
@@ -61,4 +64,4 @@ $(VENV)/.benchmark: $(VENV)/.dev
 	@touch $@
 
 clean: ## remove the environment and everything DVC can make again
-	rm -rf $(VENV) data/crane data/fanuc
+	rm -rf $(VENV) data/crane data/fanuc data/smartee

@@ -13,6 +13,7 @@ import numpy as np
 from flexik import parameters, stage
 from flexik.datasets.crane_measured.own import own_campaign
 from flexik.datasets.fanuc.samples import taught_path
+from flexik.datasets.smartee.poses import draw, geometry_of, joints_of, path_poses
 from flexik.errors import DataError, FlexikError, ParameterError
 from flexik.files import write_text
 from flexik.mechanisms.crane import CraneGeometry, check_assembly, smallest_extension
@@ -22,21 +23,23 @@ from flexik.multibody.crane.assembly import flexible_crane
 from flexik.parameters import load_parameters
 
 OUTPUT = Path("data/validated.txt")
-DATA, FANUC = Path("data/crane"), Path("data/fanuc")
+DATA, FANUC, SMARTEE = Path("data/crane"), Path("data/fanuc"), Path("data/smartee")
 
 
 def main() -> None:
     """Run the stage; with --check alone nothing is written or removed."""
     given = load_parameters()
-    crane, fanuc = given.crane, given.fanuc
+    crane, fanuc, smartee = given.crane, given.fanuc, given.smartee
     check_crane(crane)
     check_fanuc(fanuc)
+    check_smartee(smartee)
     if sys.argv[1:] == ["--check"]:
         return
     if sys.argv[1:]:
         raise FlexikError("usage: validate.py [--check]")
     remove_stale(crane)
     remove_stale_networks(fanuc)
+    remove_stale_smartee(smartee)
     write_text(OUTPUT, "params.yaml is valid\n")
 
 
@@ -92,6 +95,19 @@ def check_fanuc(fanuc: parameters.Fanuc) -> None:
         raise ParameterError(f"params.yaml: {error}") from None
 
 
+def check_smartee(smartee: parameters.SmartEE) -> None:
+    """The legs reach the centre of the workspace, every pose that is drawn, and the paths."""
+    try:
+        for name in smartee.poses:
+            draw(smartee, name)
+        for n_samples in smartee.path.n_samples:
+            path_poses(smartee, n_samples)
+        centre = np.array([[*smartee.workspace.centre, 0.0, 0.0, 0.0]])
+        joints_of(geometry_of(smartee), centre, "smartee.workspace.centre")
+    except ParameterError as error:
+        raise ParameterError(f"params.yaml: {error}") from None
+
+
 def remove_stale(crane: parameters.Crane) -> None:
     """Delete what stages of earlier names left, which would stay inputs of the report."""
     evaluations = {f"{label}.parquet" for label in ("none", *crane.methods)}
@@ -105,8 +121,23 @@ def remove_stale(crane: parameters.Crane) -> None:
             f"{name}{end}" for name in crane.studies for end in (".json", ".parquet")
         },
     }
+    _remove_others(DATA, current)
+
+
+def remove_stale_smartee(smartee: parameters.SmartEE) -> None:
+    """The same for the SmartEE."""
+    current = {
+        "poses": {f"{name}.parquet" for name in smartee.poses},
+        "networks": {
+            f"{name}{end}" for name in smartee.networks for end in (".json", "_training.csv")
+        },
+    }
+    _remove_others(SMARTEE, current)
+
+
+def _remove_others(data: Path, current: dict[str, set[str]]) -> None:
     for folder, names in current.items():
-        for path in (DATA / folder).glob("[!.]*"):
+        for path in (data / folder).glob("[!.]*"):
             if path.is_file() and path.name not in names:
                 print(f"removing {path}: its name is not in params.yaml")
                 path.unlink()

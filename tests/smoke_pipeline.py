@@ -11,7 +11,9 @@ import yaml
 from flexik.parameters import PARAMETERS_FILE, read_yaml
 
 ROOT = Path(__file__).parents[1]
-CRANE, FANUC = (read_yaml(ROOT / PARAMETERS_FILE)[case] for case in ("crane", "fanuc"))
+CRANE, FANUC, SMARTEE = (
+    read_yaml(ROOT / PARAMETERS_FILE)[case] for case in ("crane", "fanuc", "smartee")
+)
 GENERATED = ("grid", "selection")
 
 

@@ -1,4 +1,4 @@
-"""Back-propagation, L-BFGS and Adam: their steps by hand, limits, and what they keep."""
+"""Back-propagation, L-BFGS, Adam, the fading penalty: steps by hand, limits, what they keep."""
 
 import itertools
 import math
@@ -12,11 +12,12 @@ from flexik.learning.adam import Adam
 from flexik.learning.back_propagation import BackPropagation
 from flexik.learning.lbfgs import Lbfgs
 from flexik.learning.problem import Problem
+from flexik.learning.regularised_cg import RegularisedCg
 from flexik.learning.stopping import Minimum, Monitor, Stopping, StopReason
 from flexik.learning.training import TRAINERS
 from flexik.learning.weights import Weights, flatten, moved
 
-SETTINGS = (BackPropagation, Adam, Lbfgs)
+SETTINGS = (BackPropagation, Adam, Lbfgs, RegularisedCg)
 every_trainer = pytest.mark.parametrize("trainer", SETTINGS)
 
 

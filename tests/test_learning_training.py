@@ -255,12 +255,28 @@ def test_settings_out_of_range_are_named(call, message):
         call()
 
 
+def test_spread_weights_start_near_the_origin_or_far_from_it():
+    def start(spread: float, restart: int = 0) -> np.ndarray:
+        settings = trainer_settings("lbfgs", {"n_iterations": 1, "goal": 1e9})
+        sizes = Architecture((5, 4))
+        network, _ = train(
+            *data(150), sizes, settings, 3, INPUTS, OUTPUTS, restart=restart, spread=spread
+        )
+        return np.concatenate([matrix.ravel() for matrix in network.weights])
+
+    near, far = start(0.1), start(10.0)
+    assert 0.09 < np.abs(near).max() <= 0.1
+    np.testing.assert_allclose(far, 100.0 * near, rtol=1e-12)
+    assert np.abs(start(0.1, restart=1) - near).max() > 0.05
+
+
 EVERY_TRAINER = {
     "levenberg_marquardt": {"n_iterations": 60},
     "levenberg_marquardt_accelerated": {"n_iterations": 60},
     "back_propagation": {"n_iterations": 40, "mode": "pattern"},
     "adam": {"n_iterations": 200, "learning_rate": 0.02},
     "lbfgs": {"n_iterations": 200},
+    "regularised_cg": {"n_iterations": 60},
 }
 every_trainer = pytest.mark.parametrize(("name", "options"), EVERY_TRAINER.items())
 

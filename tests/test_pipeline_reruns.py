@@ -166,6 +166,25 @@ def test_stages_of_the_arm_notice_their_own_sections(copy):
         assert set(json.loads(done.stdout)) == {"validate", "fanuc_report", *expected}, values
 
 
+WATCHING_PLATE = [
+    ({"networks__best__seed": 2}, {"smartee_train@best", "smartee_evaluate"}),
+    ({"sizes__n_restarts": 3}, {"smartee_sizes"}),
+    ({"starts__success": 1e-4}, {"smartee_starts"}),
+    ({"poses__random__seed": 9}, {"smartee_generate@random", "smartee_evaluate"}),
+    ({"outside__seed": 2}, {"smartee_evaluate"}),
+]
+
+
+def test_stages_of_the_plate_notice_their_own_sections(copy):
+    original = (copy / PARAMETERS_FILE).read_text()
+    for values, expected in WATCHING_PLATE:
+        (copy / PARAMETERS_FILE).write_text(original)
+        edit(copy, **{f"smartee__{key}": value for key, value in values.items()})
+        done = call(copy, "dvc", "status", "--json")
+        assert done.returncode == 0, done.stderr
+        assert set(json.loads(done.stdout)) == {"validate", "smartee_report", *expected}, values
+
+
 def test_a_wrong_parameter_is_one_line_that_names_it(copy):
     edit(copy, crane__structure__beams__lift__mass=-124.6)
     done = reproduce(copy)
@@ -192,6 +211,8 @@ def test_a_damaged_table_is_one_line_that_names_it(copy):
         ("crane_select.py", "modular", "crane: there is no network of selected size"),
         ("crane_evaluate.py", "nothing", "crane.methods"),
         ("fanuc_train.py", "nothing", "fanuc: there is no network"),
+        ("smartee_train.py", "nothing", "smartee.networks: there is no network"),
+        ("smartee_generate.py", "nothing", "smartee.poses: there is no set"),
     ],
 )
 def test_an_unknown_name_is_told(copy, script, argument, named):

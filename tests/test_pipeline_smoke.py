@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from smoke_pipeline import CRANE, FANUC, ROOT
+from smoke_pipeline import CRANE, FANUC, ROOT, SMARTEE
 
 from flexik.datasets.crane.evaluations import TARGET_FIELDS, TOLERANCE_FIELDS
 from flexik.datasets.crane.grid import FIELDS
@@ -137,6 +137,24 @@ def test_the_report_of_the_arm_is_there_with_its_metrics(project):
     assert metrics["closed_form.success_percent"] == 100.0
     page = (folder / "README.md").read_text()
     assert "not available" in page and "Not measured with these settings" in page
+    for figure in (folder / "figures").iterdir():
+        assert figure.read_bytes().startswith(b"\x89PNG")
+        assert f"figures/{figure.name}" in page
+
+
+def test_the_report_of_the_plate_is_there_with_its_metrics(project):
+    folder = project / "reports/smartee"
+    metrics = json.loads((folder / "metrics.json").read_text())
+    assert all(isinstance(v, int | float) and math.isfinite(v) for v in metrics.values())
+    for name in SMARTEE["networks"]:
+        for key in ("peak_elbow_rad", "peak_position_mm", "peak_orientation_rad"):
+            assert metrics[f"{name}.{key}"] > 0.0
+    assert metrics["newton2.peak_elbow_rad"] < metrics["newton1.peak_elbow_rad"]
+    # whatever the networks learnt
+    assert metrics["newton.random_n_failed"] == 0
+    page = (folder / "README.md").read_text()
+    # the benchmark was run with other parameters
+    assert "No times" in page
     for figure in (folder / "figures").iterdir():
         assert figure.read_bytes().startswith(b"\x89PNG")
         assert f"figures/{figure.name}" in page

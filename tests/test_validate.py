@@ -148,3 +148,33 @@ def test_networks_of_the_arm_that_are_gone_are_removed(folder):
     assert done.returncode == 0, done.stderr
     assert all(path.exists() for path in kept) and not any(path.exists() for path in stale)
     assert not stale[0].parent.exists() and done.stdout.count("removing") == len(stale)
+
+
+@pytest.mark.parametrize(
+    ("where", "message"),
+    [
+        (("geometry", "plate_radius", 0.3), "smartee.poses.dense: the legs do not reach 4000 of"),
+        (("workspace", "centre", [0.0, 0.0, 0.3]), "smartee.poses.dense: the legs do not reach"),
+        (("geometry", "first_link", 0.0), "smartee.geometry.first_link: "),
+        (("networks", "network", "poses", "gone"), "smartee.networks.network.poses: there is no"),
+    ],
+)
+def test_a_mistake_about_the_plate_is_one_line(folder, where, message):
+    change(folder, *where, case="smartee")
+    done = validate(folder)
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"error: params.yaml: {message}")
+
+
+def test_results_of_the_plate_that_are_gone_are_removed(folder):
+    kept = [folder / "data/smartee/networks/best.json", folder / "data/smartee/poses/dense.parquet"]
+    stale = [folder / "data/smartee/networks/gone_training.csv"]
+    stale += [folder / "data/smartee/poses/gone.parquet"]
+    for path in (*kept, *stale):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    done = validate(folder)
+    assert done.returncode == 0, done.stderr
+    assert all(path.exists() for path in kept) and not any(path.exists() for path in stale)
+    assert done.stdout.count("removing") == len(stale)

@@ -8,7 +8,15 @@ from functools import cached_property
 import numpy as np
 
 from flexik.learning.perceptron import Array
-from flexik.learning.weights import Weights, backward, forward, second_derivative, slopes_of
+from flexik.learning.weights import (
+    Weights,
+    backward,
+    backward_squares,
+    derivative,
+    forward,
+    second_derivative,
+    slopes_of,
+)
 
 # Samples in work at once, at most: bounds memory, and longer chunks leave the cache. No setting,
 # because sums are rounded chunk by chunk, and a long run makes much of the last digit.
@@ -111,6 +119,25 @@ class Problem:
                 second = second_derivative(weights, self.activation, layers, slopes, direction)
                 product += backward(weights, layers, slopes, second)
         return product
+
+    def curvature(self, weights: Weights, direction: Weights) -> Array:
+        """J^T J `direction` (w,)."""
+        product = np.zeros(sum(matrix.size for matrix in weights))
+        with np.errstate(over="ignore", invalid="ignore"):
+            for chunk in self.chunks(weights):
+                layers, slopes = chunk.layers, chunk.slopes
+                change = derivative(weights, layers, slopes, direction)
+                product += backward(weights, layers, slopes, change)
+        return product
+
+    def curvature_diagonal(self, weights: Weights) -> Array:
+        """Diagonal (w,) of J^T J, see `weights.backward_squares`."""
+        diagonal = np.zeros(sum(matrix.size for matrix in weights))
+        with np.errstate(over="ignore", invalid="ignore"):
+            for chunk in self.chunks(weights):
+                squares = np.ones_like(chunk.targets)
+                diagonal += backward_squares(weights, chunk.layers, chunk.slopes, squares)
+        return diagonal
 
     def _new_chunks(self, weights: Weights, inputs: Array, targets: Array) -> Iterator[Chunk]:
         n, length = targets.shape[1], chunk_length(targets.shape[1])

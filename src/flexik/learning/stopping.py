@@ -23,6 +23,7 @@ class StopReason(StrEnum):
     SELECTION = "selection"  # the selection error no longer falls
     MU = "mu"  # no step lowers the error, however short
     LINE_SEARCH = "line_search"  # no step along the search direction lowers the error
+    STATIONARY = "stationary"  # a round of weaker penalty changes neither weights nor error
     SINGULAR = "singular"  # the damped system has no Cholesky factor up to the largest mu
     NON_FINITE = "non_finite"  # the error or its derivatives overflowed
 

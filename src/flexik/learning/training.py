@@ -15,7 +15,14 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from flexik.errors import DataError, TrainingError
-from flexik.learning import accelerated, adam, back_propagation, lbfgs, levenberg_marquardt
+from flexik.learning import (
+    accelerated,
+    adam,
+    back_propagation,
+    lbfgs,
+    levenberg_marquardt,
+    regularised_cg,
+)
 from flexik.learning.accelerated import LevenbergMarquardtAccelerated
 from flexik.learning.adam import Adam
 from flexik.learning.back_propagation import BackPropagation
@@ -29,8 +36,9 @@ from flexik.learning.perceptron import (
     Quantity,
 )
 from flexik.learning.problem import Problem, problem
+from flexik.learning.regularised_cg import RegularisedCg
 from flexik.learning.stopping import Minimum, Stopping, StopReason
-from flexik.learning.weights import Weights, initial_weights
+from flexik.learning.weights import Weights, initial_weights, uniform_weights
 
 __all__ = [
     "TRAINERS",
@@ -40,9 +48,11 @@ __all__ = [
     "Lbfgs",
     "LevenbergMarquardt",
     "LevenbergMarquardtAccelerated",
+    "RegularisedCg",
     "StopReason",
     "Stopping",
     "TrainingRecord",
+    "restarts_csv",
     "train",
     "train_best",
     "trainer_settings",
@@ -69,6 +79,7 @@ TRAINERS = {
     "back_propagation": Trainer(BackPropagation, back_propagation.minimise),
     "adam": Trainer(Adam, adam.minimise),
     "lbfgs": Trainer(Lbfgs, lbfgs.minimise),
+    "regularised_cg": Trainer(RegularisedCg, regularised_cg.minimise),
 }
 
 
@@ -163,6 +174,7 @@ class _Task:
     selection: tuple[Array, Array] | None
     judge: Judge | None
     observer: Observer | None = None
+    spread: float | None = None
 
 
 def train(
@@ -177,6 +189,7 @@ def train(
     restart: int = 0,
     judge: Judge | None = None,
     observer: Observer | None = None,
+    spread: float | None = None,
 ) -> tuple[Network, TrainingRecord]:
     """Train one network; the same as restart `restart` of `train_best`.
 
@@ -189,6 +202,8 @@ def train(
     selection : inputs (m, p) and outputs (m, q) the training does not see, if any
     judge : gives the selection error, else that of the normalised outputs on `selection`
     observer : called with the network of every iteration, as many as the record has errors
+    spread : when given, the initial weights are uniform in [-spread, spread]; else they are those
+        of Nguyen and Widrow
 
     Raises
     ------
@@ -204,7 +219,9 @@ def train(
         selection = _checked_pair("selection", *selection, quantities)
     elif settings.selection_patience is not None:
         raise TrainingError("trainer setting selection_patience needs selection data")
-    task = _Task(*data, architecture, settings, seed, 1, quantities, selection, judge, observer)
+    task = _Task(
+        *data, architecture, settings, seed, 1, quantities, selection, judge, observer, spread
+    )
     _check(task)
     network, record = _run(task, restart)
     if network is None:
@@ -269,18 +286,31 @@ def train_best(
     return network, record, records
 
 
+def restarts_csv(records: Sequence[TrainingRecord], n_hidden: int | tuple[int, ...]) -> str:
+    """CSV, a row a restart; errors are root mean squares of normalised outputs."""
+    lines = [
+        "restart,n_hidden,trainer,n_iterations,training_error,selection_error,stop_reason",
+    ]
+    for record in records:
+        error = repr(math.sqrt(record.errors[record.kept])) if record.errors else ""
+        judged = "" if record.selection_error is None else repr(record.selection_error)
+        lines.append(
+            f"{record.restart},{n_hidden},{record.trainer},{len(record.errors) - 1},{error},"
+            f"{judged},{record.stop_reason}"
+        )
+    return "\n".join(lines) + "\n"
+
+
 def _run(task: _Task, restart: int) -> tuple[Network | None, TrainingRecord]:
     started = time.perf_counter()
     name, trainer = _trainer(task.settings)
     normalisations = Normalisation.from_data(task.inputs), Normalisation.from_data(task.outputs)
     generator = np.random.default_rng((task.seed, restart))
-    start = initial_weights(
-        task.inputs.shape[1],
-        task.architecture.hidden_sizes,
-        task.outputs.shape[1],
-        task.architecture.activation,
-        generator,
-    )
+    sizes = task.inputs.shape[1], task.architecture.hidden_sizes, task.outputs.shape[1]
+    if task.spread is None:
+        start = initial_weights(*sizes, task.architecture.activation, generator)
+    else:
+        start = uniform_weights(*sizes, task.spread, generator)
     # the order of sums in a product depends on the number of threads, so it is one everywhere
     with threadpool_limits(1):
         minimum = trainer.minimise(start, _problem(task, normalisations), task.settings, generator)

@@ -4,6 +4,7 @@ Everything here is in normalised values. Samples lie along the last axis, contig
 because the passes multiply whole rows of samples.
 """
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -57,6 +58,21 @@ def initial_weights(
     return tuple(matrices)
 
 
+def uniform_weights(
+    n_inputs: int,
+    hidden_sizes: Sequence[int],
+    n_outputs: int,
+    spread: float,
+    generator: np.random.Generator,
+) -> Weights:
+    """All weights uniform in [-spread, spread]: near the origin, or far from it."""
+    sizes = (n_inputs, *hidden_sizes, n_outputs)
+    return tuple(
+        generator.uniform(-spread, spread, (n_units, n_before + 1))
+        for n_before, n_units in itertools.pairwise(sizes)
+    )
+
+
 def _nguyen_widrow(
     n_inputs: int, n_units: int, activation: str, generator: np.random.Generator
 ) -> Array:
@@ -103,6 +119,39 @@ def backward(weights: Weights, layers: list[Array], slopes: list[Array], errors:
         errors *= slopes[k - 1]
         parts.append(errors @ layers[k - 1].T)
     return flatten(parts[::-1])
+
+
+def backward_squares(
+    weights: Weights, layers: list[Array], slopes: list[Array], squares: Array
+) -> Array:
+    """As `backward`, with every factor squared: the diagonal (w,) of J^T J for `squares` of 1.
+
+    Exact for one hidden layer; with more, products of different paths are left out (Becker and
+    LeCun 1989).
+    """
+    parts = [squares @ (layers[-1] ** 2).T]
+    for k in range(len(weights) - 1, 0, -1):
+        squares = (weights[k][:, :-1] ** 2).T @ squares
+        squares *= slopes[k - 1] ** 2
+        parts.append(squares @ (layers[k - 1] ** 2).T)
+    return flatten(parts[::-1])
+
+
+def derivative(
+    weights: Weights, layers: list[Array], slopes: list[Array], direction: Weights
+) -> Array:
+    """J `direction`: derivative (q, c) of the outputs along `direction` of the weights.
+
+    Parameters
+    ----------
+    layers, slopes : of `forward` and `slopes_of`
+    """
+    change = direction[0] @ layers[0]
+    for k, slopes_k in enumerate(slopes, start=1):
+        change *= slopes_k
+        change = weights[k][:, :-1] @ change
+        change += direction[k] @ layers[k]
+    return change
 
 
 def second_derivative(

@@ -26,6 +26,8 @@ from flexik.parameters.reading import (
     read_yaml,
     validate,
 )
+from flexik.parameters.smartee import SmartEE
+from flexik.parameters.smartee import Workspace as SmartEEWorkspace
 from flexik.parameters.structure import Structure
 
 __all__ = [
@@ -44,6 +46,8 @@ __all__ = [
     "PathNetwork",
     "Section",
     "SelectedModularNetwork",
+    "SmartEE",
+    "SmartEEWorkspace",
     "Structure",
     "Workspace",
     "load_parameters",

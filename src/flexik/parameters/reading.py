@@ -14,6 +14,7 @@ from flexik.files import checksum
 from flexik.parameters.crane import Crane
 from flexik.parameters.fanuc import Fanuc
 from flexik.parameters.model import Model
+from flexik.parameters.smartee import SmartEE
 
 PARAMETERS_FILE = "params.yaml"
 
@@ -31,6 +32,7 @@ class Parameters(Model):
     parallel: Parallel
     crane: Crane
     fanuc: Fanuc
+    smartee: SmartEE
 
 
 def load_parameters(path: Path | str = PARAMETERS_FILE) -> Parameters:

@@ -84,14 +84,34 @@ class Lbfgs(Stopping):
     memory: Count
 
 
+class RegularisedCg(Stopping):
+    """See learning.regularised_cg."""
+
+    kind: Literal["regularised_cg"]
+    penalty: Positive
+    penalty_decrease: Annotated[float, Field(gt=0, lt=1)]
+    weight_tolerance: Positive
+    error_tolerance: Positive
+    round_steps: Count
+    round_progress: Annotated[float, Field(ge=0, lt=1)]
+    cg_iterations: Count
+    cg_tolerance: Annotated[float, Field(gt=0, lt=1)]
+
+
 TRAINER_KINDS = (
     "levenberg_marquardt",
     "levenberg_marquardt_accelerated",
     "back_propagation",
     "adam",
     "lbfgs",
+    "regularised_cg",
 )
 Trainer = Annotated[
-    LevenbergMarquardt | LevenbergMarquardtAccelerated | BackPropagation | Adam | Lbfgs,
+    LevenbergMarquardt
+    | LevenbergMarquardtAccelerated
+    | BackPropagation
+    | Adam
+    | Lbfgs
+    | RegularisedCg,
     Field(discriminator="kind"),
 ]

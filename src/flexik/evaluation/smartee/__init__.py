@@ -1,0 +1,1 @@
+"""Errors of the direct kinematics of the SmartEE."""

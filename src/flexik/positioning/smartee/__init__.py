@@ -1,0 +1,1 @@
+"""Direct kinematics of the SmartEE: network, Newton, and both together."""

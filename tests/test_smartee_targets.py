@@ -1,0 +1,52 @@
+"""What the last run of the pipeline reports of the SmartEE, against published values and targets.
+
+Long training amplifies rounding, so another CPU trains other networks: some room is left.
+"""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+ROOM = 1.5
+
+
+@pytest.fixture(scope="module")
+def metrics():
+    return json.loads((ROOT / "reports/smartee/metrics.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def published():
+    path = ROOT / "data/reference/smartee/peaks.csv"
+    return pd.read_csv(path).set_index("quantity")
+
+
+@pytest.mark.parametrize("quantity", ["elbow", "position", "orientation"])
+def test_published_trainer_reaches_the_published_peaks(metrics, published, quantity):
+    unit, peak = published.loc[quantity, ["unit", "peak"]]
+    assert metrics[f"network.peak_{quantity}_{unit}"] <= peak
+    assert metrics[f"best.peak_{quantity}_{unit}"] <= ROOM * 0.1 * peak
+
+
+def test_two_newton_steps_leave_nothing_to_speak_of(metrics):
+    assert metrics["newton2.peak_elbow_rad"] <= 1e-9
+    assert metrics["newton2.random_peak_elbow_rad"] <= ROOM * 1e-9
+
+
+def test_newton_finds_every_pose_of_the_box(metrics):
+    assert metrics["newton.random_n_failed"] == metrics["newton.validation_n_failed"] == 0
+    assert metrics["closure.largest_condition_number"] < 3.2
+
+
+def test_the_penalty_helps_starts_that_are_far_from_the_origin(metrics):
+    share = {
+        (trainer, spread): metrics[f"starts.{trainer}.{spread}.success_share"]
+        for trainer in ("regularised_cg", "unpenalised_cg", "lbfgs")
+        for spread in ("near", "far")
+    }
+    assert share["regularised_cg", "far"] >= 0.8 > 0.5 > share["unpenalised_cg", "far"]
+    assert share["regularised_cg", "far"] > share["lbfgs", "far"]
+    assert share["unpenalised_cg", "near"] > 0.8
