@@ -1,4 +1,4 @@
-"""Rigid and flexible kinematics of the arm: homogeneous matrices, printed equations, round trips."""
+"""Kinematics of the elastic arm: homogeneous matrices, printed equations, round trips."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flexik.mechanisms.elastic_arm import (
-    ANGLE_LIMIT,
-    OUT_OF_REACH,
-    REACHED,
     ArmGeometry,
     elbow,
     flexible_forward,
@@ -16,9 +13,12 @@ from flexik.mechanisms.elastic_arm import (
     inverse,
     inverse_by_rule,
 )
+from flexik.mechanisms.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
 
-ARM = ArmGeometry((0.57, 0.62), (tuple(np.radians([-10.0, 45.0])), tuple(np.radians([-45.0, 70.0]))))
-FREE = ArmGeometry((0.57, 0.62), ((-np.pi, np.pi), (-np.pi, np.pi)))
+LENGTHS = (0.57, 0.62)
+LIMITS = np.radians([[-10.0, 45.0], [-45.0, 70.0]]).tolist()
+ARM = ArmGeometry(LENGTHS, (tuple(LIMITS[0]), tuple(LIMITS[1])))
+FREE = ArmGeometry(LENGTHS, ((-np.pi, np.pi), (-np.pi, np.pi)))
 
 
 def denavit_hartenberg(theta, length):
@@ -117,7 +117,7 @@ def test_rule_prefers_positive_theta_2_and_takes_the_other_only_where_it_must():
 def test_status_and_angles_of_targets_beyond_reach_and_limits():
     targets = np.array([[1.2, 0.0], [0.01, 0.0], [-1.0, 0.1], [1.1, 0.3]])
     found = inverse_by_rule(ARM, targets)
-    assert found.status.tolist() == [OUT_OF_REACH, OUT_OF_REACH, ANGLE_LIMIT, REACHED]
+    assert found.status.tolist() == [OUT_OF_REACH, OUT_OF_REACH, ACTUATOR_LIMIT, REACHED]
     assert np.isnan(found.angles).all(axis=1).tolist() == [True, True, False, False]
     assert forward(ARM, found.angles[2:]) == pytest.approx(targets[2:], abs=1e-12)
 

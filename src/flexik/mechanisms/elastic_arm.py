@@ -1,8 +1,8 @@
 """Planar arm of two links, rigid and with the deformation of its links, vectorised.
 
 Vertical plane: x forward, y up, origin in the first joint. Actuator coordinates are the joint
-angles theta_1 (of link 1 from x) and theta_2 (of link 2 from link 1), in rad. Source: Al-Khafaji and
-Jweeg 2017, equations 10 to 46.
+angles theta_1 (of link 1 from x) and theta_2 (of link 2 from link 1), in rad. Source: Al-Khafaji
+and Jweeg 2017, equations 10 to 46.
 
 A link under load has six deformation variables in both, in the order of the paper's network:
 dy, dx and dphi of link 1, then of link 2. dx along the link and dy across it move the end of the
@@ -15,6 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flexik.mechanisms.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
+
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
@@ -22,8 +24,6 @@ DEFORMATION = ("dy_1", "dx_1", "dphi_1", "dy_2", "dx_2", "dphi_2")
 
 # An angle this far outside its limits is round-off of a target on the border, rad
 ANGLE_TOLERANCE = 1e-10
-
-REACHED, OUT_OF_REACH, ANGLE_LIMIT = 0, 1, 2
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,9 @@ class ArmGeometry:
 
 
 class InverseSolution(NamedTuple):
-    """Joint angles (n, 2) in rad and a status (n,): REACHED, OUT_OF_REACH or ANGLE_LIMIT.
+    """Joint angles (n, 2) in rad and a status (n,), see mechanisms.status.
 
-    Rows with OUT_OF_REACH hold NaN; rows with ANGLE_LIMIT the angles that would be needed.
+    Rows with OUT_OF_REACH hold NaN; rows with ACTUATOR_LIMIT the angles that would be needed.
     """
 
     angles: Array
@@ -91,7 +91,7 @@ def inverse(geometry: ArmGeometry, targets: Array, elbow: Array | float) -> Inve
     a_1, a_2 = geometry.lengths
     cosine = (x**2 + y**2 - a_1**2 - a_2**2) / (2 * a_1 * a_2)
     # round-off of a stretched or folded arm is within reach
-    within = np.abs(cosine) <= 1.0 + 1e-12
+    within = np.atleast_1d(np.abs(cosine) <= 1.0 + 1e-12)
     theta_2 = elbow * np.arccos(np.where(within, np.clip(cosine, -1.0, 1.0), np.nan))
     theta_1 = np.arctan2(y, x) - np.arctan2(a_2 * np.sin(theta_2), a_1 + a_2 * np.cos(theta_2))
     # the turn that lies within the limits, if one does
@@ -106,7 +106,7 @@ def inverse(geometry: ArmGeometry, targets: Array, elbow: Array | float) -> Inve
     angles = np.where(inside[:, None], np.clip(angles, geometry.lower, geometry.upper), angles)
     angles[~within] = np.nan
     return InverseSolution(
-        angles, np.where(within, np.where(inside, REACHED, ANGLE_LIMIT), OUT_OF_REACH)
+        angles, np.where(within, np.where(inside, REACHED, ACTUATOR_LIMIT), OUT_OF_REACH)
     )
 
 

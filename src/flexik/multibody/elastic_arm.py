@@ -14,15 +14,14 @@ from exudyn import itemInterface as item
 
 from flexik.errors import SolverError
 from flexik.mechanisms.elastic_arm import ArmGeometry
+from flexik.multibody.beams import Array, Beam, Elements, Section, discretise, nearest
 from flexik.multibody.elements import PlacedBeam, place_beam
-from flexik.multibody.structure import Array, Beam, Elements, Section, discretise, nearest
 
 # Newton's residual, N and N m: the last step falls far below it, onto the round-off floor
-NEWTON_TOLERANCE = 1e-5
+NEWTON_TOLERANCE = 1e-6
 
 ELEMENT = "geometrically_exact"
-POSITION, ROTATION = exu.OutputVariableType.Position, exu.OutputVariableType.Rotation
-STRAIN = exu.OutputVariableType.StrainLocal
+POSITION, STRAIN = exu.OutputVariableType.Position, exu.OutputVariableType.StrainLocal
 
 
 @dataclass(frozen=True)
@@ -162,7 +161,9 @@ class ArmModel:
             solved = False
         if not solved or not np.isfinite(self.system.systemData.GetODE2Coordinates()).all():
             degrees = ", ".join(f"{angle:.6g}" for angle in angles)
-            raise SolverError(f"no static equilibrium at angles ({degrees}) rad with {payload:g} kg")
+            raise SolverError(
+                f"no static equilibrium at angles ({degrees}) rad with {payload:g} kg"
+            )
 
     def equilibrium(self) -> Equilibria:
         """The last solution, of arrays without the axis of the samples."""
