@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from flexik.errors import DataError, TrainingError
@@ -43,6 +44,7 @@ __all__ = [
     "StopReason",
     "Stopping",
     "TrainingRecord",
+    "records_table",
     "train",
     "train_best",
     "trainer_settings",
@@ -265,6 +267,22 @@ def train_best(
     if network is None or math.isinf(_selection_error((network, record))):
         raise _no_network(task, records)
     return network, record, records
+
+
+def records_table(records: Sequence[TrainingRecord]) -> pd.DataFrame:
+    """Restarts of one network, a row each; errors are root mean squares of normalised outputs."""
+    rows = [
+        {
+            "restart": record.restart,
+            "trainer": record.trainer,
+            "n_iterations": len(record.errors) - 1,
+            "training_error": np.sqrt(record.errors[record.kept]) if record.errors else np.nan,
+            "selection_error": record.selection_error,
+            "stop_reason": record.stop_reason,
+        }
+        for record in records
+    ]
+    return pd.DataFrame(rows)
 
 
 def _run(task: _Task, restart: int) -> tuple[Network | None, TrainingRecord]:

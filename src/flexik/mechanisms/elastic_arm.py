@@ -90,9 +90,7 @@ def inverse(geometry: ArmGeometry, targets: Array, elbow: Array | float) -> Inve
     x, y = targets.T
     a_1, a_2 = geometry.lengths
     cosine = (x**2 + y**2 - a_1**2 - a_2**2) / (2 * a_1 * a_2)
-    # round-off of a stretched or folded arm is within reach
-    within = np.atleast_1d(np.abs(cosine) <= 1.0 + 1e-12)
-    theta_2 = elbow * np.arccos(np.where(within, np.clip(cosine, -1.0, 1.0), np.nan))
+    theta_2 = elbow * _arccos(cosine)
     theta_1 = np.arctan2(y, x) - np.arctan2(a_2 * np.sin(theta_2), a_1 + a_2 * np.cos(theta_2))
     # the turn that lies within the limits, if one does
     low = geometry.limits[0][0] - ANGLE_TOLERANCE
@@ -102,12 +100,12 @@ def inverse(geometry: ArmGeometry, targets: Array, elbow: Array | float) -> Inve
         allowed = (angles >= geometry.lower - ANGLE_TOLERANCE) & (
             angles <= geometry.upper + ANGLE_TOLERANCE
         )
-    inside = allowed.all(axis=1)
+    inside: NDArray[np.bool_] = np.all(allowed, axis=1)
     angles = np.where(inside[:, None], np.clip(angles, geometry.lower, geometry.upper), angles)
-    angles[~within] = np.nan
-    return InverseSolution(
-        angles, np.where(within, np.where(inside, REACHED, ACTUATOR_LIMIT), OUT_OF_REACH)
-    )
+    unreached = np.isnan(theta_2)
+    angles = np.where(unreached[:, None], np.nan, angles)
+    status = np.where(unreached, OUT_OF_REACH, np.where(inside, REACHED, ACTUATOR_LIMIT))
+    return InverseSolution(angles, status)
 
 
 def inverse_by_rule(geometry: ArmGeometry, targets: Array) -> InverseSolution:
@@ -122,6 +120,12 @@ def inverse_by_rule(geometry: ArmGeometry, targets: Array) -> InverseSolution:
         np.where(use_second[:, None], second.angles, first.angles),
         np.where(use_second, second.status, first.status),
     )
+
+
+def _arccos(cosine: Array) -> Array:
+    """Arc cosine (n,), NaN outside [-1, 1] but for round-off of a stretched or folded arm."""
+    within = np.abs(cosine) <= 1.0 + 1e-12
+    return np.arccos(np.where(within, np.clip(cosine, -1.0, 1.0), np.nan))
 
 
 def _turned(angle: Array, along: Array, across: Array) -> Array:

@@ -6,6 +6,16 @@ where DVC watches it. The names `size` and `nfiles` are never used: DVC's run ca
 
 from flexik.parameters.crane import Crane
 from flexik.parameters.data import Workspace
+from flexik.parameters.elastic_arm import (
+    ArmMethod,
+    ArmNetwork,
+    CombinedMethod,
+    DegreeAxis,
+    ElasticArm,
+    GaugeMethod,
+    Readings,
+    SelectedArmNetwork,
+)
 from flexik.parameters.measured import Measured
 from flexik.parameters.methods import CombinedModel, InvertedModel, MethodModel
 from flexik.parameters.model import Model as Section
@@ -29,15 +39,23 @@ from flexik.parameters.structure import Structure
 __all__ = [
     "PARAMETERS_FILE",
     "AnyNetwork",
+    "ArmMethod",
+    "ArmNetwork",
+    "CombinedMethod",
     "CombinedModel",
     "Crane",
+    "DegreeAxis",
+    "ElasticArm",
+    "GaugeMethod",
     "InvertedModel",
     "Measured",
     "MethodModel",
     "ModularNetwork",
     "NetworkModel",
     "Parameters",
+    "Readings",
     "Section",
+    "SelectedArmNetwork",
     "SelectedModularNetwork",
     "Structure",
     "Workspace",

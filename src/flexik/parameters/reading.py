@@ -12,6 +12,7 @@ from pydantic import BaseModel, Field, ValidationError
 from flexik.errors import ParameterError
 from flexik.files import checksum
 from flexik.parameters.crane import Crane
+from flexik.parameters.elastic_arm import ElasticArm
 from flexik.parameters.model import Model
 
 PARAMETERS_FILE = "params.yaml"
@@ -29,6 +30,7 @@ class Parameters(Model):
 
     parallel: Parallel
     crane: Crane
+    elastic_arm: ElasticArm
 
 
 def load_parameters(path: Path | str = PARAMETERS_FILE) -> Parameters:

@@ -123,6 +123,14 @@ def solve(
     return found, failures
 
 
+def equilibria(arm: FlexibleArm, angles: Array, payload: Array) -> Equilibria:
+    """Equilibria as by `solve`; raises the SolverError of the first row that fails."""
+    found, failures = solve(arm, angles, payload)
+    if failures:
+        raise next(iter(failures.values()))
+    return found
+
+
 class ArmModel:
     """An Exudyn system that is placed at joint angles and solved for payloads."""
 
