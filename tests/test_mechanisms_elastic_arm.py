@@ -106,12 +106,22 @@ def test_elbows_mirror_each_other():
     assert (up[0] + down[0]) / 2 == pytest.approx(np.arctan2(tip[0, 1], tip[0, 0]))
 
 
-def test_rule_prefers_positive_theta_2_and_takes_the_other_only_where_it_must():
+def test_rule_takes_the_elbow_farther_inside_the_limits():
+    # the first tip has its other elbow at (26, -20) degrees, the second at (-1, 20): nearer -10
     angles = np.radians([[5.0, 20.0], [20.0, -20.0], [0.0, -35.0], [15.0, -40.0], [30.0, 0.0]])
     found = inverse_by_rule(ARM, forward(ARM, angles))
     assert found.reached.all()
     assert forward(ARM, found.angles) == pytest.approx(forward(ARM, angles), abs=1e-12)
-    assert elbow(found.angles).tolist() == [1.0, 1.0, -1.0, -1.0, 1.0]
+    assert elbow(found.angles).tolist() == [1.0, -1.0, -1.0, -1.0, 1.0]
+
+
+@given(st.floats(-0.8, 0.8), st.floats(0.5, 1.19))
+def test_rule_reaches_what_either_elbow_reaches(direction, reach):
+    target = reach * np.array([[np.cos(direction), np.sin(direction)]])
+    either = [inverse(ARM, target, side) for side in (1.0, -1.0)]
+    found = inverse_by_rule(ARM, target)
+    assert found.reached[0] == any(solution.reached[0] for solution in either)
+    assert any(np.array_equal(found.angles, s.angles) for s in either)
 
 
 def test_status_and_angles_of_targets_beyond_reach_and_limits():

@@ -111,11 +111,16 @@ def inverse(geometry: ArmGeometry, targets: Array, elbow: Array | float) -> Inve
 def inverse_by_rule(geometry: ArmGeometry, targets: Array) -> InverseSolution:
     """Angles for `targets` (n, 2) in m on the elbow that a rule chooses.
 
-    theta_2 >= 0 is taken wherever it lies within the joint limits, theta_2 < 0 only elsewhere: with
-    the limits of the experiment most tips are reached by the first alone or by both.
+    The rule takes the elbow whose angles lie farther inside their limits, relative to half the
+    range of each joint, and theta_2 >= 0 of equals. So it reaches what either elbow reaches.
     """
     first, second = (inverse(geometry, targets, side) for side in (1.0, -1.0))
-    use_second = ~first.reached & second.reached
+    middle, half = (geometry.lower + geometry.upper) / 2, (geometry.upper - geometry.lower) / 2
+    with np.errstate(invalid="ignore"):
+        first_off, second_off = (
+            np.max(np.abs(solution.angles - middle) / half, axis=1) for solution in (first, second)
+        )
+        use_second = second_off < first_off
     return InverseSolution(
         np.where(use_second[:, None], second.angles, first.angles),
         np.where(use_second, second.status, first.status),

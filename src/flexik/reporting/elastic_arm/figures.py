@@ -124,6 +124,7 @@ def _figure_network_comparison(r: Mapping[str, Array], published: Mapping[str, A
                     [1.0 - published[label][k]],
                     [place],
                     mark,
+                    markersize=10,
                     markerfacecolor="none",
                     color=colour,
                     label=f"{name}, published",

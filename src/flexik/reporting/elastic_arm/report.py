@@ -168,8 +168,8 @@ def _positioning_text(results: Results) -> str:
     lines = [
         "Error = target minus tip of the flexible model at the commanded angles. "
         f"{arm.workspace.n_targets} targets drawn at random, kept where the angles that put the "
-        "loaded tip on them lie within the readings' range. The elbow is that of theta_2 >= 0 "
-        "wherever the joint limits allow it.",
+        "loaded tip on them lie within the readings' range. Of the two elbows every method takes "
+        "the one farther inside the joint limits.",
         "- `none`: rigid inverse kinematics alone.",
     ]
     for label, method in arm.methods.items():
@@ -186,9 +186,9 @@ def _positioning_text(results: Results) -> str:
             text = f"network `{method.network}` ({hidden}) of target, payload and elbow."
         else:
             text = (
-                f"rigid inverse, deflection by the network `{method.network}` ({hidden}), corrected "
-                f"target, rigid inverse again (corrections: {method.n_corrections}); the code of "
-                "the crane."
+                f"rigid inverse, deflection by the network `{method.network}` ({hidden}), "
+                "corrected target, rigid inverse again (corrections: "
+                f"{method.n_corrections}); the code of the crane."
             )
         lines.append(f"- `{label}`: {text}")
     return lines[0] + "\n\n" + "\n".join(lines[1:])

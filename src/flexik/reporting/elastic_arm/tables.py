@@ -67,8 +67,7 @@ def fit_notes(results: Results) -> list[str]:
     for name, (_, held_out) in fits.items():
         network = results.arm.all_networks[name]
         if network.readings == FREE_OF_NOISE and network.trainer == "back_propagation":
-            deep = len(results.layers[name]) > 1
-            by_depth[deep].append((float(held_out.r.min()), name))
+            by_depth[len(results.layers[name]) > 1].append((float(held_out.r.min()), name))
     if all(by_depth.values()):
         (deep_r, deep), (flat_r, flat) = max(by_depth[True]), max(by_depth[False])
         notes.append(
@@ -173,7 +172,7 @@ def write_tables(results: Results, folder: Path) -> None:
     tables.write_table(
         folder / "gauges",
         gauges,
-        {name: 4 for name in gauges.columns[2:]},
+        dict.fromkeys(gauges.columns[2:], 4),
         "Deformation by the strain gauges beside that of the model.",
         gauges_notes(results),
     )
@@ -187,10 +186,22 @@ def write_tables(results: Results, folder: Path) -> None:
     )
     for name, (sizes, chosen) in results.studies.items():
         errors = [c for c in sizes.columns if c.endswith("_error")]
+        trainer = results.arm.selected_networks[name].select.trainer
         tables.write_table(
             folder / "size_selection" / name,
             sizes.astype(dict.fromkeys([*layer_columns(sizes), "n_failed"], int)),
             dict.fromkeys(errors, 6),
-            f"Search of `{name}`, trained by `{results.arm.selected_networks[name].select.trainer}`; "
-            f"the selection error chooses {layers_name(chosen)}.",
+            f"Search of `{name}`, trained by `{trainer}`; the selection error chooses "
+            f"{layers_name(chosen)}.",
+            size_notes(sizes, chosen),
         )
+
+
+def size_notes(sizes: pd.DataFrame, chosen: tuple[int, ...]) -> list[str]:
+    """Layers in which the choice lies on the border of the search."""
+    largest = sizes[layer_columns(sizes)].max().tolist()
+    notes = []
+    for number, (n, most) in enumerate(zip(chosen, largest, strict=True), start=1):
+        if n == most:
+            notes.append(f"Layer {number}: the choice is the largest that was tried.")
+    return notes
