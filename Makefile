@@ -58,4 +58,4 @@ $(VENV)/.benchmark: $(VENV)/.dev
 	@touch $@
 
 clean: ## remove the environment and everything DVC can make again
-	rm -rf $(VENV) data/crane
+	rm -rf $(VENV) data/crane data/elastic_arm

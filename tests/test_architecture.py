@@ -289,6 +289,28 @@ def test_stages_of_a_network_watch_its_trainers_and_the_network_it_corrects(name
         assert networks == ([f"{folder}/{network['rigid']}.json"] if "rigid" in network else [])
 
 
+ARM_NETWORKS = {
+    name: (section, network)
+    for section in ("networks", "selected_networks")
+    for name, network in PARAMETERS["elastic_arm"][section].items()
+}
+
+
+@pytest.mark.parametrize("name", ARM_NETWORKS)
+def test_stages_of_a_network_of_the_arm_watch_its_trainers(name):
+    section, network = ARM_NETWORKS[name]
+    prefixes = ("elastic_arm_train", "elastic_arm_select")
+    of_network = [s for s in STAGES if s.endswith(f"@{name}") and s.startswith(prefixes)]
+    assert len(of_network) == (2 if "select" in network else 1)
+    trainers = {network["trainer"], network.get("select", network)["trainer"]}
+    for stage in of_network:
+        params = set(STAGES[stage]["params"])
+        assert f"elastic_arm.{section}.{name}" in params
+        assert {key for key in params if key.startswith("elastic_arm.trainers")} == {
+            f"elastic_arm.trainers.{trainer}" for trainer in trainers
+        }
+
+
 @each_stage
 def test_every_stage_tells_what_it_does(name):
     assert STAGES[name]["desc"].endswith(".")

@@ -31,9 +31,9 @@ def write_report(results: Results, folder: Path, published_files: list[Path]) ->
     write_page(results, folder, inputs)
 
 
-def metrics(results: Results) -> dict[str, float | str]:
+def metrics(results: Results) -> dict[str, float]:
     """Flat; lengths in mm, rounded to what machines agree on."""
-    found: dict[str, float | str] = {}
+    found: dict[str, float] = {}
     for name, (training, held_out) in results.fits.items():
         for k in (0, 1):
             found[f"{name}.r_theta{k + 1}"] = round(float(held_out.r[k]), 6)
@@ -46,7 +46,8 @@ def metrics(results: Results) -> dict[str, float | str]:
             found[f"{label}.{name}_mm"] = round(MM * values[name], 4)
         found[f"{label}.n_failed"] = int(values["n_failed"])
     for name, (_, chosen) in results.studies.items():
-        found[f"select.{name}.n_hidden"] = layers_name(chosen)
+        for layer, n_hidden in enumerate(chosen, start=1):
+            found[f"select.{name}.n_hidden_{layer}"] = n_hidden
     for part, n in results.readings["part"].value_counts().sort_index().items():
         found[f"readings.n_{part}"] = int(n)
     return found
@@ -176,7 +177,7 @@ def _positioning_text(results: Results) -> str:
         network = arm.all_networks[method.network]
         hidden = layers_name(results.layers[method.network])
         if method.method == "gauges":
-            shown = (network.readings or "").replace("_", " ")
+            shown = (network.readings or "").replace("_", "-")
             text = (
                 f"network `{method.network}` ({hidden}) of the target and the deformation that "
                 f"{shown} gauges show in the very pose it should find. No controller knows that "

@@ -36,7 +36,7 @@ def fit_table(results: Results) -> pd.DataFrame:
                 "network": name,
                 "hidden": layers_name(results.layers[name]),
                 "trainer": network.trainer,
-                "gauges": (network.readings or "").replace("_", " "),
+                "gauges": (network.readings or "").replace("_", "-"),
                 "R theta_1, training": training.r[0],
                 "R theta_2, training": training.r[1],
                 "R theta_1, held out": held_out.r[0],
@@ -134,8 +134,8 @@ def gauges_table(results: Results) -> pd.DataFrame:
         }
         for shown, table in results.shown.items():
             difference = np.abs(MM * table[name].to_numpy() - model)
-            row[f"mean difference, {shown.replace('_', ' ')}"] = difference.mean()
-            row[f"max difference, {shown.replace('_', ' ')}"] = difference.max()
+            row[f"mean difference, {shown.replace('_', '-')}"] = difference.mean()
+            row[f"max difference, {shown.replace('_', '-')}"] = difference.max()
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -143,7 +143,7 @@ def gauges_table(results: Results) -> pd.DataFrame:
 def gauges_notes(results: Results) -> list[str]:
     """How far the tip by the equations is from the model's."""
     return [
-        f"Tip by equations 44 and 45 from {shown.replace('_', ' ')} gauges, from the model's: mean "
+        f"Tip by equations 44 and 45 from {shown.replace('_', '-')} gauges, from the model's: mean "
         f"{MM * apart.mean():.2f} mm, max {MM * apart.max():.2f} mm."
         for shown in results.shown
         for apart in [results.gauge_difference(shown)]
