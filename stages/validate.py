@@ -89,9 +89,7 @@ def crane_names(crane: parameters.Crane) -> dict[str, set[str]]:
 
 def arm_names(arm: parameters.ElasticArm) -> dict[str, set[str]]:
     """Files of the elastic arm by folder that belong to a name of params.yaml."""
-    evaluations = {f"{label}.parquet" for label in ("none", *arm.methods)}
-    networks = network_names(arm.all_networks, arm.selected_networks)
-    return {"evaluations": evaluations, **networks}
+    return network_names(arm.all_networks, arm.selected_networks)
 
 
 def network_names(networks: Iterable[str], studies: Iterable[str]) -> dict[str, set[str]]:

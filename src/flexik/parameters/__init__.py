@@ -35,12 +35,14 @@ from flexik.parameters.reading import (
     validate,
 )
 from flexik.parameters.structure import Structure
+from flexik.parameters.trainers import BackPropagation
 
 __all__ = [
     "PARAMETERS_FILE",
     "AnyNetwork",
     "ArmMethod",
     "ArmNetwork",
+    "BackPropagation",
     "CombinedMethod",
     "CombinedModel",
     "Crane",

@@ -10,7 +10,7 @@ from flexik.datasets.elastic_arm.readings import ANGLES, HELD_OUT, degree_axis
 from flexik.evaluation.errors import workspace_statistics
 from flexik.evaluation.regression import correlation
 from flexik.files import file_checksum, write_json
-from flexik.parameters import parameters_checksum
+from flexik.parameters import BackPropagation, parameters_checksum
 from flexik.reporting import page
 from flexik.reporting.crane import method_figures
 from flexik.reporting.elastic_arm import figures
@@ -146,8 +146,7 @@ def write_page(results: Results, folder: Path, inputs: Mapping[str, str]) -> Non
         ),
         page.Section(
             "Training",
-            "The selection readings choose among restarts and sizes; the held-out readings are in "
-            "neither set.",
+            _training_text(results),
             [
                 folder / "training.md",
                 *(folder / "size_selection" / f"{name}.md" for name in results.studies),
@@ -204,6 +203,24 @@ def _fit_text(results: Results) -> str:
         "45 from them, as in the paper; R is the correlation of network and target. Held-out "
         "readings lie between training readings of the same payloads."
     )
+
+
+def _training_text(results: Results) -> str:
+    lines = [
+        "The selection readings choose among restarts and sizes; the held-out readings are in "
+        "neither set."
+    ]
+    for name, trainer in results.arm.trainers.items():
+        if isinstance(trainer, BackPropagation):
+            lines.append(
+                f"`{name}`: steps along the whole gradient, at most {trainer.n_iterations} epochs, "
+                f"goal {trainer.goal:g}, minimum gradient {trainer.minimum_gradient:g}, learning "
+                f"rate from {trainer.learning_rate:g} on, times {trainer.rate_increase:g} after a "
+                f"better and {trainer.rate_decrease:g} after a much worse epoch, momentum "
+                f'{trainer.momentum:g}. The paper\'s "learning increment 0.9" is read as the '
+                "momentum: as a factor of the rate it would let the rate die out."
+            )
+    return "\n\n".join(lines)
 
 
 def _gauges_text(results: Results) -> str:
