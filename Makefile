@@ -64,4 +64,4 @@ $(VENV)/.benchmark: $(VENV)/.dev
 	@touch $@
 
 clean: ## remove the environment and everything DVC can make again
-	rm -rf $(VENV) data/crane data/fanuc data/smartee
+	rm -rf $(VENV) data/crane data/elastic_arm data/fanuc data/smartee

@@ -13,9 +13,6 @@ import functools
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-import pandas as pd
-
 from flexik import parameters, stage
 from flexik.datasets.crane.learning import KINDS, read_learning_data
 from flexik.datasets.crane.provenance import network_checksum
@@ -24,9 +21,10 @@ from flexik.errors import ParameterError, TrainingError
 from flexik.files import write_text
 from flexik.learning.modular import combine
 from flexik.learning.perceptron import Network, quantities
+from flexik.learning.records import restarts_csv
 from flexik.learning.size_selection import read_choice
 from flexik.learning.storage import load_network, save_network
-from flexik.learning.training import Architecture, TrainingRecord, train_best, trainer_settings
+from flexik.learning.training import Architecture, train_best, trainer_settings
 from flexik.multibody.crane.assembly import read_spring_stiffness
 from flexik.parameters import load_parameters
 
@@ -65,7 +63,7 @@ def main() -> None:
     except TrainingError as error:
         raise TrainingError(f"network {name}: {error}") from None
     folder = DATA / "networks"
-    write_text(folder / f"{name}_training.csv", summary(records, best.n_hidden))
+    write_text(folder / f"{name}_training.csv", restarts_csv(records, best.n_hidden))
     if rigid is not None:
         best = combine(rigid, replace(best, outputs=rigid.outputs))
         best = replace(best, outputs=tuple(quantities(KINDS["direct"].outputs)))
@@ -89,23 +87,6 @@ def size_of(crane: parameters.Crane, name: str) -> int:
     if isinstance(network, parameters.NetworkModel | parameters.ModularNetwork):
         return network.n_hidden
     return read_choice(DATA / "size_selection" / f"{name}.json")
-
-
-def summary(records: list[TrainingRecord], n_hidden: int | tuple[int, ...]) -> str:
-    """CSV, a row a restart; errors are root mean squares of normalised outputs."""
-    rows = [
-        {
-            "restart": record.restart,
-            "n_hidden": n_hidden,
-            "trainer": record.trainer,
-            "n_iterations": len(record.errors) - 1,
-            "training_error": np.sqrt(record.errors[record.kept]) if record.errors else np.nan,
-            "selection_error": record.selection_error,
-            "stop_reason": record.stop_reason,
-        }
-        for record in records
-    ]
-    return pd.DataFrame(rows).to_csv(index=False)
 
 
 if __name__ == "__main__":

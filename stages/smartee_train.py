@@ -17,8 +17,9 @@ from flexik.datasets.smartee.provenance import network_checksum
 from flexik.errors import ParameterError, TrainingError
 from flexik.files import write_text
 from flexik.learning.perceptron import quantities
+from flexik.learning.records import restarts_csv
 from flexik.learning.storage import save_network
-from flexik.learning.training import Architecture, restarts_csv, train_best, trainer_settings
+from flexik.learning.training import Architecture, train_best, trainer_settings
 from flexik.parameters import load_parameters
 
 DATA = Path("data/smartee")

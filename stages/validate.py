@@ -6,6 +6,7 @@ Reads params.yaml and the files it names. Writes data/validated.txt, whose conte
 
 import shutil
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -17,29 +18,32 @@ from flexik.datasets.smartee.poses import draw, geometry_of, joints_of, path_pos
 from flexik.errors import DataError, FlexikError, ParameterError
 from flexik.files import write_text
 from flexik.mechanisms.crane import CraneGeometry, check_assembly, smallest_extension
+from flexik.mechanisms.elastic_arm import inverse_by_rule
 from flexik.mechanisms.fanuc import check_spherical_wrist
 from flexik.mechanisms.serial_arm import SerialArm
 from flexik.multibody.crane.assembly import flexible_crane
+from flexik.multibody.elastic_arm.assembly import flexible_arm
 from flexik.parameters import load_parameters
 
 OUTPUT = Path("data/validated.txt")
-DATA, FANUC, SMARTEE = Path("data/crane"), Path("data/fanuc"), Path("data/smartee")
+DATA = Path("data")
 
 
 def main() -> None:
     """Run the stage; with --check alone nothing is written or removed."""
     given = load_parameters()
-    crane, fanuc, smartee = given.crane, given.fanuc, given.smartee
-    check_crane(crane)
-    check_fanuc(fanuc)
-    check_smartee(smartee)
+    check_crane(given.crane)
+    check_arm(given.elastic_arm)
+    check_fanuc(given.fanuc)
+    check_smartee(given.smartee)
     if sys.argv[1:] == ["--check"]:
         return
     if sys.argv[1:]:
         raise FlexikError("usage: validate.py [--check]")
-    remove_stale(crane)
-    remove_stale_networks(fanuc)
-    remove_stale_smartee(smartee)
+    remove_stale("crane", crane_names(given.crane))
+    remove_stale("elastic_arm", arm_names(given.elastic_arm))
+    remove_stale("smartee", smartee_names(given.smartee))
+    remove_stale_networks(given.fanuc)
     write_text(OUTPUT, "params.yaml is valid\n")
 
 
@@ -108,36 +112,49 @@ def check_smartee(smartee: parameters.SmartEE) -> None:
         raise ParameterError(f"params.yaml: {error}") from None
 
 
-def remove_stale(crane: parameters.Crane) -> None:
-    """Delete what stages of earlier names left, which would stay inputs of the report."""
+def check_arm(arm: parameters.ElasticArm) -> None:
+    """The arm reaches something of the workspace within its joint limits."""
+    space = arm.workspace
+    raster = np.array(
+        [(x, y) for x in np.linspace(*space.x, 60) for y in np.linspace(*space.y, 60)]
+    )
+    if not inverse_by_rule(flexible_arm(arm).geometry, raster).reached.any():
+        raise ParameterError("params.yaml: elastic_arm.workspace: the arm reaches nothing in x, y")
+
+
+def crane_names(crane: parameters.Crane) -> dict[str, set[str]]:
+    """Files of the crane by folder that belong to a name of params.yaml."""
     evaluations = {f"{label}.parquet" for label in ("none", *crane.methods)}
-    current = {
+    return {
         "evaluations": evaluations,
         "workspace": evaluations,
-        "networks": {
-            f"{name}{end}" for name in crane.all_networks for end in (".json", "_training.csv")
-        },
-        "size_selection": {
-            f"{name}{end}" for name in crane.studies for end in (".json", ".parquet")
-        },
+        **network_names(crane.all_networks, crane.studies),
     }
-    _remove_others(DATA, current)
 
 
-def remove_stale_smartee(smartee: parameters.SmartEE) -> None:
-    """The same for the SmartEE."""
-    current = {
-        "poses": {f"{name}.parquet" for name in smartee.poses},
-        "networks": {
-            f"{name}{end}" for name in smartee.networks for end in (".json", "_training.csv")
-        },
+def arm_names(arm: parameters.ElasticArm) -> dict[str, set[str]]:
+    """Files of the elastic arm by folder that belong to a name of params.yaml."""
+    return network_names(arm.all_networks, arm.selected_networks)
+
+
+def smartee_names(smartee: parameters.SmartEE) -> dict[str, set[str]]:
+    """Files of the SmartEE by folder that belong to a name of params.yaml."""
+    poses = {f"{name}.parquet" for name in smartee.poses}
+    return {"poses": poses, "networks": network_names(smartee.networks, ())["networks"]}
+
+
+def network_names(networks: Iterable[str], studies: Iterable[str]) -> dict[str, set[str]]:
+    """Files of `networks`, and of `studies` of sizes, by folder."""
+    return {
+        "networks": {f"{name}{end}" for name in networks for end in (".json", "_training.csv")},
+        "size_selection": {f"{name}{end}" for name in studies for end in (".json", ".parquet")},
     }
-    _remove_others(SMARTEE, current)
 
 
-def _remove_others(data: Path, current: dict[str, set[str]]) -> None:
+def remove_stale(case: str, current: dict[str, set[str]]) -> None:
+    """Delete what stages of earlier names left, which would stay inputs of the report."""
     for folder, names in current.items():
-        for path in (data / folder).glob("[!.]*"):
+        for path in (DATA / case / folder).glob("[!.]*"):
             if path.is_file() and path.name not in names:
                 print(f"removing {path}: its name is not in params.yaml")
                 path.unlink()
@@ -145,7 +162,7 @@ def _remove_others(data: Path, current: dict[str, set[str]]) -> None:
 
 def remove_stale_networks(fanuc: parameters.Fanuc) -> None:
     """Delete networks of the taught path, and their curves, of names that are no more."""
-    for path in [*FANUC.glob("networks/[!.]*"), *FANUC.glob("curves/[!.]*")]:
+    for path in [*(DATA / "fanuc").glob("networks/[!.]*"), *(DATA / "fanuc").glob("curves/[!.]*")]:
         if path.name.removesuffix(".parquet") not in fanuc.networks:
             print(f"removing {path}: its name is not in params.yaml")
             shutil.rmtree(path) if path.is_dir() else path.unlink()

@@ -235,9 +235,10 @@ def test_every_parameter_of_a_stage_exists(name):
         lookup(PARAMETERS, key)
 
 
-CASES = set(PARAMETERS) - {"parallel"}
 # What a script mentions for other methods than that of the stage
 OTHER_METHODS = {"crane_evaluate_none": {"methods"}}
+# Section of params.yaml by the name it has in scripts
+SECTIONS = {case: case for case in PARAMETERS if case != "parallel"} | {"arm": "elastic_arm"}
 
 
 @each_stage
@@ -245,12 +246,12 @@ def test_every_section_a_script_mentions_is_a_parameter_of_its_stage(name):
     """Sections named as CASE.SECTION in the script; how many workers compute decides nothing."""
     tree = ast.parse(script_of(STAGES[name]).read_text())
     mentioned = {
-        (node.value.id, node.attr)
+        (SECTIONS[node.value.id], node.attr)
         for node in ast.walk(tree)
         if isinstance(node, ast.Attribute)
         and isinstance(node.value, ast.Name)
-        and node.value.id in CASES
-        and node.attr in PARAMETERS[node.value.id]
+        and name.startswith(SECTIONS.get(node.value.id, " "))
+        and node.attr in PARAMETERS[SECTIONS[node.value.id]]
     }
     watched = STAGES[name].get("params", [])
     if "params.yaml" in STAGES[name]["deps"]:
@@ -285,6 +286,28 @@ def test_stages_of_a_network_watch_its_trainers_and_the_network_it_corrects(name
         }
         networks = [path for path in stage["deps"] if path.startswith(folder)]
         assert networks == ([f"{folder}/{network['rigid']}.json"] if "rigid" in network else [])
+
+
+ARM_NETWORKS = {
+    name: (section, network)
+    for section in ("networks", "selected_networks")
+    for name, network in PARAMETERS["elastic_arm"][section].items()
+}
+
+
+@pytest.mark.parametrize("name", ARM_NETWORKS)
+def test_stages_of_a_network_of_the_arm_watch_its_trainers(name):
+    section, network = ARM_NETWORKS[name]
+    prefixes = ("elastic_arm_train", "elastic_arm_select")
+    of_network = [s for s in STAGES if s.endswith(f"@{name}") and s.startswith(prefixes)]
+    assert len(of_network) == (2 if "select" in network else 1)
+    trainers = {network["trainer"], network.get("select", network)["trainer"]}
+    for stage in of_network:
+        params = set(STAGES[stage]["params"])
+        assert f"elastic_arm.{section}.{name}" in params
+        assert {key for key in params if key.startswith("elastic_arm.trainers")} == {
+            f"elastic_arm.trainers.{trainer}" for trainer in trainers
+        }
 
 
 @each_stage

@@ -6,9 +6,21 @@ import pytest
 
 from flexik.datasets.parallel import ParallelSettings
 from flexik.datasets.tables import read_table
-from flexik.errors import TrainingError
+from flexik.errors import DataError, TrainingError
+from flexik.files import write_json
 from flexik.learning.perceptron import Quantity
-from flexik.learning.size_selection import FAILED, FIELDS, Study, by_size, choose, run_study
+from flexik.learning.size_selection import (
+    FAILED,
+    FIELDS,
+    Study,
+    by_size,
+    choose,
+    choose_layers,
+    read_choice,
+    read_layers,
+    run_study,
+    study_fields,
+)
 from flexik.learning.training import Architecture, train_best, trainer_settings
 
 SETTINGS = trainer_settings("levenberg_marquardt_accelerated", {"n_iterations": 8})
@@ -101,3 +113,46 @@ def test_best_median_and_worst_of_restarts():
 def test_no_choice_when_all_fail():
     with pytest.raises(TrainingError, match="every run failed"):
         choose(table({4: np.nan, 8: np.nan}))
+
+
+def test_pairs_of_layers_are_searched_like_single_ones(study, tmp_path):
+    pairs, path = [(2, 3), (4, 3), (5, 200)], tmp_path / "study.parquet"
+    run_study(path, study, pairs, 2, "made", "key", ParallelSettings(1), "")
+    runs = read_table(path, study_fields(2), "made")
+    assert runs[["n_hidden_1", "n_hidden_2"]].to_numpy().tolist() == [
+        [*pair] for pair in pairs for _ in range(2)
+    ]
+    _, best, _ = train_best(
+        *(study.inputs, study.outputs, study.selection_inputs, study.selection_outputs),
+        *(Architecture((4, 3)), SETTINGS, 5, 2, *QUANTITIES),
+    )
+    sizes = by_size(runs).set_index(["n_hidden_1", "n_hidden_2"])
+    assert sizes.loc[(4, 3), "selection_error"] == best.selection_error
+    assert sizes["n_failed"].tolist() == [0, 0, 2]
+    assert choose_layers(by_size(runs)) == (4, 3)
+
+
+def test_smallest_pair_has_the_fewest_neurons():
+    sizes = pd.DataFrame(
+        {"n_hidden_1": [2, 4, 3], "n_hidden_2": [9, 4, 5], "selection_error": [1.0, 1.05, 1.05]}
+    )
+    assert choose_layers(sizes) == (2, 9)
+    assert choose_layers(sizes, 0.1) == (3, 5)
+
+
+def test_sizes_of_one_study_have_as_many_layers(study, tmp_path):
+    with pytest.raises(TrainingError, match="as many hidden layers"):
+        run_study(tmp_path / "s.parquet", study, [3, (2, 3)], 1, "", "", ParallelSettings(1), "")
+
+
+def test_choices_are_read_back(tmp_path):
+    path = tmp_path / "choice.json"
+    for chosen, layers in ((7, (7,)), ([15, 13], (15, 13))):
+        write_json(path, {"n_hidden": chosen})
+        assert read_layers(path) == layers
+    with pytest.raises(DataError, match="one hidden layer"):
+        read_choice(path)
+    for wrong in ([], [0, 3], "7", None):
+        write_json(path, {"n_hidden": wrong})
+        with pytest.raises(DataError, match="positive integer n_hidden"):
+            read_layers(path)

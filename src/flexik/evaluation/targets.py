@@ -25,7 +25,7 @@ class Targets:
 
     targets : (n, 2) in m.
     payload : (n,) in kg.
-    strokes : (n, 3) in m, which put the loaded tip on the targets.
+    strokes : (n, k) in m or rad, which put the loaded tip on the targets.
     """
 
     targets: Array
@@ -35,14 +35,14 @@ class Targets:
     def __post_init__(self) -> None:
         checked("targets", self.targets, None, 2)
         checked("payload", self.payload, len(self.targets))
-        checked("strokes", self.strokes, len(self.targets), 3)
+        checked("strokes", self.strokes, len(self.targets), None)
 
     def __len__(self) -> int:
         return len(self.targets)
 
 
 class TargetSolution(NamedTuple):
-    """Strokes (n, 3) in m, whether they reach (n,), and how far off the loaded tip is (n,) in m.
+    """Strokes (n, k), whether they reach (n,), and how far off the loaded tip is (n,) in m.
 
     A residual of NaN marks rows where the inverse or the equilibrium failed; a finite one of a row
     that is not reached, rows that did not converge. Those rows hold the strokes of their last pass.
@@ -98,6 +98,7 @@ def solve_targets(
     flexible_tip: FlexibleTip,
     tolerance: float = TOLERANCE,
     n_iterations: int = N_ITERATIONS,
+    n_strokes: int = 3,
 ) -> TargetSolution:
     """Strokes that put the loaded tip on `targets`, by fixed-point iteration of the deflection.
 
@@ -115,13 +116,15 @@ def solve_targets(
     inverse
         Rigid inverse; one that treats each row alone makes each row of the result independent.
     rigid_tip
-        Tip (n, 2) in m of the rigid manipulator at strokes (n, 3) in m.
+        Tip (n, 2) in m of the rigid manipulator at strokes (n, k).
     flexible_tip
         The same of the flexible one under payload (n,) in kg; NaN where it has no equilibrium.
     tolerance
         Accepted distance between loaded tip and target, in m.
     n_iterations
         Passes at most.
+    n_strokes
+        Number of actuator coordinates, k.
 
     Raises
     ------
@@ -130,7 +133,7 @@ def solve_targets(
     """
     targets = checked("targets", targets, None, 2)
     payload = checked("payload", payload, len(targets))
-    strokes, deflection = np.zeros((len(targets), 3)), np.zeros(targets.shape)
+    strokes, deflection = np.zeros((len(targets), n_strokes)), np.zeros(targets.shape)
     residual = np.full(len(targets), np.nan)
     rows = np.arange(len(targets))
     for _ in range(n_iterations):
@@ -156,9 +159,10 @@ def reachable_targets(
     flexible_tip: FlexibleTip,
     tolerance: float = TOLERANCE,
     n_iterations: int = N_ITERATIONS,
+    n_strokes: int = 3,
 ) -> Targets:
     """Those of `targets` that `solve_targets` reaches, in their order; see there."""
     strokes, reached, _ = solve_targets(
-        targets, payload, inverse, rigid_tip, flexible_tip, tolerance, n_iterations
+        targets, payload, inverse, rigid_tip, flexible_tip, tolerance, n_iterations, n_strokes
     )
     return Targets(targets[reached], payload[reached], strokes[reached])

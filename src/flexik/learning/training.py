@@ -52,7 +52,6 @@ __all__ = [
     "StopReason",
     "Stopping",
     "TrainingRecord",
-    "restarts_csv",
     "train",
     "train_best",
     "trainer_settings",
@@ -284,21 +283,6 @@ def train_best(
     if network is None or math.isinf(_selection_error((network, record))):
         raise _no_network(task, records)
     return network, record, records
-
-
-def restarts_csv(records: Sequence[TrainingRecord], n_hidden: int | tuple[int, ...]) -> str:
-    """CSV, a row a restart; errors are root mean squares of normalised outputs."""
-    lines = [
-        "restart,n_hidden,trainer,n_iterations,training_error,selection_error,stop_reason",
-    ]
-    for record in records:
-        error = repr(math.sqrt(record.errors[record.kept])) if record.errors else ""
-        judged = "" if record.selection_error is None else repr(record.selection_error)
-        lines.append(
-            f"{record.restart},{n_hidden},{record.trainer},{len(record.errors) - 1},{error},"
-            f"{judged},{record.stop_reason}"
-        )
-    return "\n".join(lines) + "\n"
 
 
 def _run(task: _Task, restart: int) -> tuple[Network | None, TrainingRecord]:

@@ -6,6 +6,16 @@ where DVC watches it. The names `size` and `nfiles` are never used: DVC's run ca
 
 from flexik.parameters.crane import Crane
 from flexik.parameters.data import Workspace
+from flexik.parameters.elastic_arm import (
+    ArmMethod,
+    ArmNetwork,
+    CombinedMethod,
+    DegreeAxis,
+    ElasticArm,
+    GaugeMethod,
+    Readings,
+    SelectedArmNetwork,
+)
 from flexik.parameters.fanuc import Fanuc, PathNetwork
 from flexik.parameters.fanuc import Path as FanucPath
 from flexik.parameters.measured import Measured
@@ -29,14 +39,22 @@ from flexik.parameters.reading import (
 from flexik.parameters.smartee import SmartEE
 from flexik.parameters.smartee import Workspace as SmartEEWorkspace
 from flexik.parameters.structure import Structure
+from flexik.parameters.trainers import BackPropagation
 
 __all__ = [
     "PARAMETERS_FILE",
     "AnyNetwork",
+    "ArmMethod",
+    "ArmNetwork",
+    "BackPropagation",
+    "CombinedMethod",
     "CombinedModel",
     "Crane",
+    "DegreeAxis",
+    "ElasticArm",
     "Fanuc",
     "FanucPath",
+    "GaugeMethod",
     "InvertedModel",
     "Measured",
     "MethodModel",
@@ -44,7 +62,9 @@ __all__ = [
     "NetworkModel",
     "Parameters",
     "PathNetwork",
+    "Readings",
     "Section",
+    "SelectedArmNetwork",
     "SelectedModularNetwork",
     "SmartEE",
     "SmartEEWorkspace",

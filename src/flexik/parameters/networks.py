@@ -27,6 +27,10 @@ class Sizes(Axis):
     maximum: Count
     increment: Count
 
+    def values(self) -> list[int]:
+        """All of them."""
+        return list(range(self.minimum, self.maximum + 1, self.increment))
+
 
 class Select(Model):
     """Study of sizes, see learning.size_selection."""

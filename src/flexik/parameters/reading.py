@@ -12,6 +12,7 @@ from pydantic import BaseModel, Field, ValidationError
 from flexik.errors import ParameterError
 from flexik.files import checksum
 from flexik.parameters.crane import Crane
+from flexik.parameters.elastic_arm import ElasticArm
 from flexik.parameters.fanuc import Fanuc
 from flexik.parameters.model import Model
 from flexik.parameters.smartee import SmartEE
@@ -33,6 +34,7 @@ class Parameters(Model):
     crane: Crane
     fanuc: Fanuc
     smartee: SmartEE
+    elastic_arm: ElasticArm
 
 
 def load_parameters(path: Path | str = PARAMETERS_FILE) -> Parameters:

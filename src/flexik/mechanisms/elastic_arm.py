@@ -1,0 +1,139 @@
+"""Planar arm of two links, rigid and with the deformation of its links, vectorised.
+
+Vertical plane: x forward, y up, origin in the first joint. Actuator coordinates are the joint
+angles theta_1 (of link 1 from x) and theta_2 (of link 2 from link 1), in rad. Source: Al-Khafaji
+and Jweeg 2017, equations 10 to 46.
+
+A link under load has six deformation variables in both, in the order of the paper's network:
+dy, dx and dphi of link 1, then of link 2. dx along the link and dy across it move the end of the
+link away from its rigid place, dphi turns it (equation 18).
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexik.mechanisms.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
+
+Array = NDArray[np.float64]
+Interval = tuple[float, float]
+
+DEFORMATION = ("dy_1", "dx_1", "dphi_1", "dy_2", "dx_2", "dphi_2")
+
+# An angle this far outside its limits is round-off of a target on the border, rad
+ANGLE_TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True)
+class ArmGeometry:
+    """Lengths of the two links in m, and the interval of each joint angle in rad."""
+
+    lengths: tuple[float, float]
+    limits: tuple[Interval, Interval]
+
+    @property
+    def lower(self) -> Array:
+        """Least joint angles (2,) in rad."""
+        return np.array([low for low, _ in self.limits])
+
+    @property
+    def upper(self) -> Array:
+        """Largest joint angles (2,) in rad."""
+        return np.array([high for _, high in self.limits])
+
+
+class InverseSolution(NamedTuple):
+    """Joint angles (n, 2) in rad and a status (n,), see mechanisms.status.
+
+    Rows with OUT_OF_REACH hold NaN; rows with ACTUATOR_LIMIT the angles that would be needed.
+    """
+
+    angles: Array
+    status: NDArray[np.int64]
+
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """Rows whose angles lie within the limits, (n,)."""
+        return self.status == REACHED
+
+
+def forward(geometry: ArmGeometry, angles: Array) -> Array:
+    """Tip (n, 2) in m of the rigid arm at `angles` (n, 2) in rad."""
+    angles = np.atleast_2d(angles)
+    return flexible_forward(geometry, angles, np.zeros((len(angles), 6)))
+
+
+def flexible_forward(geometry: ArmGeometry, angles: Array, deformation: Array) -> Array:
+    """Tip (n, 2) in m at `angles` (n, 2) in rad with `deformation` (n, 6) in m and rad.
+
+    Equations 44 and 45, whose products of sines and cosines are those of the sum
+    theta_1 + theta_2 + dphi_1; dphi_2 turns the tip without moving it.
+    """
+    theta_1, theta_2 = np.atleast_2d(angles).T
+    dy_1, dx_1, dphi_1, dy_2, dx_2, _ = np.atleast_2d(deformation).T
+    a_1, a_2 = geometry.lengths
+    return _turned(theta_1, a_1 + dx_1, dy_1) + _turned(
+        theta_1 + theta_2 + dphi_1, a_2 + dx_2, dy_2
+    )
+
+
+def elbow(angles: Array) -> Array:
+    """Side of the elbow (n,): 1 where theta_2 >= 0 (elbow below the line to the tip), else -1."""
+    return np.where(np.atleast_2d(angles)[:, 1] >= 0.0, 1.0, -1.0)
+
+
+def inverse(geometry: ArmGeometry, targets: Array, elbow: Array | float) -> InverseSolution:
+    """Angles that put the rigid tip on `targets` (n, 2) in m with `elbow` (n,), 1 or -1."""
+    targets = np.atleast_2d(np.asarray(targets, dtype=float))
+    x, y = targets.T
+    a_1, a_2 = geometry.lengths
+    cosine = (x**2 + y**2 - a_1**2 - a_2**2) / (2 * a_1 * a_2)
+    theta_2 = elbow * _arccos(cosine)
+    theta_1 = np.arctan2(y, x) - np.arctan2(a_2 * np.sin(theta_2), a_1 + a_2 * np.cos(theta_2))
+    # the turn that lies within the limits, if one does
+    low = geometry.limits[0][0] - ANGLE_TOLERANCE
+    theta_1 = low + np.mod(theta_1 - low, 2 * np.pi)
+    angles = np.column_stack([theta_1, theta_2])
+    with np.errstate(invalid="ignore"):
+        allowed = (angles >= geometry.lower - ANGLE_TOLERANCE) & (
+            angles <= geometry.upper + ANGLE_TOLERANCE
+        )
+    inside: NDArray[np.bool_] = np.all(allowed, axis=1)
+    angles = np.where(inside[:, None], np.clip(angles, geometry.lower, geometry.upper), angles)
+    unreached = np.isnan(theta_2)
+    angles = np.where(unreached[:, None], np.nan, angles)
+    status = np.where(unreached, OUT_OF_REACH, np.where(inside, REACHED, ACTUATOR_LIMIT))
+    return InverseSolution(angles, status)
+
+
+def inverse_by_rule(geometry: ArmGeometry, targets: Array) -> InverseSolution:
+    """Angles for `targets` (n, 2) in m on the elbow that a rule chooses.
+
+    The rule takes the elbow whose angles lie farther inside their limits, relative to half the
+    range of each joint, and theta_2 >= 0 of equals. So it reaches what either elbow reaches.
+    """
+    first, second = (inverse(geometry, targets, side) for side in (1.0, -1.0))
+    middle, half = (geometry.lower + geometry.upper) / 2, (geometry.upper - geometry.lower) / 2
+    with np.errstate(invalid="ignore"):
+        first_off, second_off = (
+            np.max(np.abs(solution.angles - middle) / half, axis=1) for solution in (first, second)
+        )
+        use_second = second_off < first_off
+    return InverseSolution(
+        np.where(use_second[:, None], second.angles, first.angles),
+        np.where(use_second, second.status, first.status),
+    )
+
+
+def _arccos(cosine: Array) -> Array:
+    """Arc cosine (n,), NaN outside [-1, 1] but for round-off of a stretched or folded arm."""
+    within = np.abs(cosine) <= 1.0 + 1e-12
+    return np.arccos(np.where(within, np.clip(cosine, -1.0, 1.0), np.nan))
+
+
+def _turned(angle: Array, along: Array, across: Array) -> Array:
+    """Vectors (n, 2) of components `along` and `across` an axis at `angle` (n,) in rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.column_stack([c * along - s * across, s * along + c * across])

@@ -1,0 +1,1 @@
+"""The flexible two-link arm."""

@@ -1,0 +1,1 @@
+"""Positioning of the elastic arm."""
