@@ -4,7 +4,7 @@ Reads params.yaml: fanuc; what the other fanuc stages wrote; the published value
 the benchmark wrote.
 Writes reports/fanuc/: joints, total_errors, passes, path_errors, study_n_hidden,
 study_learning_factor, off_path, off_path_orientation, off_path_success, whole_workspace,
-configurations and growth (CSV and Markdown), metrics.json, figures/ and README.md.
+conditioning, configurations and growth (CSV and Markdown), metrics.json, figures/ and README.md.
 """
 
 from pathlib import Path

@@ -16,6 +16,7 @@ from flexik.mechanisms.serial_arm import (
     pose_errors,
     refine,
     rotation_vector,
+    smallest_singular_value,
 )
 
 LENGTH = 0.5
@@ -85,6 +86,16 @@ def test_pose_errors_are_distance_and_angle():
     target = Pose(position, turn.as_matrix())
     distance, angle = pose_errors(target, Pose(np.zeros((1, 3)), np.eye(3)[None]))
     assert distance == pytest.approx([5.0]) and angle == pytest.approx([0.5])
+
+
+def test_the_smallest_singular_value_tells_singular_poses():
+    joints = random_joints(200) * 0.5
+    values = smallest_singular_value(ARM, joints, LENGTH)
+    scaled = jacobian(ARM, joints) * np.repeat([1.0, LENGTH], 3)[:, None]
+    gram = scaled @ scaled.swapaxes(1, 2)
+    assert values**2 == pytest.approx(np.linalg.eigvalsh(gram)[:, 0], abs=1e-12)
+    joints[:, 4] = 0.0
+    assert smallest_singular_value(ARM, joints, LENGTH).max() < 1e-15
 
 
 def well_conditioned(joints):

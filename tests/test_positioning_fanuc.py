@@ -159,6 +159,7 @@ def test_random_targets_keep_their_configuration(joints):
     frame = errors_on_targets(ARM, rough, exact, number, joints, REFINEMENT)
     assert len(frame) == 4 * 40
     assert np.array_equal(frame["configuration"].to_numpy(), np.tile(number, 4))
+    assert (frame["singular_value"] > 0.0).all()
     means = frame.groupby(["method", "n_steps"])["position_error"].median()
     assert means["rough", 0] > means["rough", 1] > means["rough", 2] > means["exact", 0]
 

@@ -78,7 +78,8 @@ def workspace_frame():
     ]
     rows += [(EXACT, number, 0, 3e-16, 0.0, 1) for number in range(8) for _ in range(5)]
     names = ("method", "configuration", "n_steps", "position_error", "orientation_error")
-    return pd.DataFrame(rows, columns=(*names, "within_limits"))
+    frame = pd.DataFrame(rows, columns=(*names, "within_limits"))
+    return frame.assign(singular_value=np.tile([0.0, 0.005, 0.02, 0.2, 0.4], len(frame) // 5))
 
 
 @pytest.fixture(scope="module")
@@ -210,6 +211,17 @@ def test_times_stand_beside_the_methods_they_were_measured_for(results):
     assert np.isnan(table.loc[EXACT, "single (us)"])
     assert table.loc["opw", "batched (us)"] == 9.0
     assert np.isnan(table.loc["opw", "mean position (mm)"])
+
+
+def test_poses_are_counted_by_how_singular_they_are(results):
+    frame = results.workspace.copy()
+    frame.loc[(frame["singular_value"] < 0.01) & (frame["method"] == WHOLE), "within_limits"] = 0
+    table = tables.conditioning(dataclasses.replace(results, workspace=frame))
+    assert table["poses"].tolist() == [16, 8, 0, 8, 8]
+    assert table["smallest singular value (m)"].iloc[[0, -1]].tolist() == ["0 to 0.01", "over 0.3"]
+    after = table[f"{WHOLE}_refined_3"]
+    assert after.iloc[[0, 1, 3, 4]].tolist() == [0.0, 100.0, 100.0, 100.0]
+    assert np.isnan(after.iloc[2]) and table[EXACT].iloc[0] == 100.0
 
 
 @pytest.mark.parametrize(

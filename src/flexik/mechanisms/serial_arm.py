@@ -109,6 +109,16 @@ def jacobian(arm: SerialArm, joints: Array) -> Array:
     return _jacobian(frames(arm, joints))
 
 
+def smallest_singular_value(arm: SerialArm, joints: Array, orientation_length: float) -> Array:
+    """Smallest singular value (n,) in m of the Jacobian at `joints` (n, n_joints) in rad.
+
+    Orientation rows count `orientation_length`, m, a radian. 0 where the arm is singular.
+    """
+    scaled = jacobian(arm, joints)
+    scaled[:, 3:] *= orientation_length
+    return np.asarray(np.linalg.svd(scaled, compute_uv=False)[:, -1], dtype=np.float64)
+
+
 def _jacobian(found: Frames) -> Array:
     axes = found.rotation[:, :-1, :, 2]
     arms = found.origin[:, -1:] - found.origin[:, :-1]

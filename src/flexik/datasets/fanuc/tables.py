@@ -62,7 +62,17 @@ OFF_PATH_FIELDS = (
     _STEPS,
     *_ERRORS,
 )
-WORKSPACE_FIELDS = (_METHOD, _NUMBER, _STEPS, *_ERRORS)
+WORKSPACE_FIELDS = (
+    _METHOD,
+    _NUMBER,
+    _STEPS,
+    Field(
+        "singular_value",
+        "m",
+        "smallest of the Jacobian, orientation rows times the orientation length; 0: singular pose",
+    ),
+    *_ERRORS,
+)
 
 
 def path_checksum(fanuc: parameters.Fanuc) -> str:

@@ -10,7 +10,7 @@ from flexik.datasets.fanuc.samples import beside
 from flexik.datasets.fanuc.tables import COMMANDED, joint_columns
 from flexik.evaluation.fanuc.errors import workspace_errors
 from flexik.mechanisms.fanuc import configuration, inverse
-from flexik.mechanisms.serial_arm import Array, SerialArm, forward
+from flexik.mechanisms.serial_arm import Array, SerialArm, forward, smallest_singular_value
 from flexik.positioning.fanuc.methods import JointMethod, refined
 
 Methods = Mapping[str, JointMethod]
@@ -73,9 +73,13 @@ def errors_on_targets(
     `number` (n,) is the arm configuration asked for.
     """
     target = forward(arm, joints)
+    singular = smallest_singular_value(arm, joints, refinement["orientation_length"])
     frames = [
         pd.DataFrame(workspace_errors(arm, target, method(target, number))).assign(
-            method=name, n_steps=np.int64(n_steps), configuration=number
+            method=name,
+            n_steps=np.int64(n_steps),
+            configuration=number,
+            singular_value=singular,
         )
         for name, n_steps, method in _variants(arm, methods, exact, refinement)
     ]

@@ -36,6 +36,7 @@ def total_errors(results: Results) -> list[str]:
             f"config2 is the more precise for every joint (means {one.mean():.2f} % and "
             f"{other.mean():.2f} %)."
         )
+        found.append("One start each: compare with the spread over starts in the study below.")
     known = results.fanuc.networks
     for number, name in enumerate(results.networks):
         for twin in results.networks[:number]:
@@ -166,6 +167,16 @@ def whole_workspace(results: Results) -> list[str]:
 def _power_above(value: float) -> float:
     """Least power of ten above `value`, at least 1e-9: digits below are the machine's."""
     return float(10.0 ** max(-9, np.floor(np.log10(max(value, 1e-10))) + 1))
+
+
+def conditioning(results: Results) -> list[str]:
+    """What the singular value is, and what it explains."""
+    length = results.fanuc.refinement.orientation_length
+    return [
+        f"Of the Jacobian at the pose, a radian of orientation counted as {length:g} m; 0 at a "
+        "singular pose. Newton steps converge slowly near singular poses, where a small step of "
+        "the pose is a large one of the joints; the closed form does not care.",
+    ]
 
 
 def growth(results: Results) -> list[str]:

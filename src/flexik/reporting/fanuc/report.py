@@ -160,11 +160,12 @@ def _whole(results: Results, folder: Path) -> page.Section:
         "sine of joints 4 and 6 times the sine of joint 5, which vanishes where they are free. "
         "Newton steps are damped."
     )
+    tables = ("whole_workspace", "conditioning", "configurations", "growth")
     caption = f"Distribution of the errors at random poses; those below {FLOOR:g} stand there."
     return page.Section(
         "The whole workspace against the closed form",
         text,
-        [folder / f"{name}.md" for name in ("whole_workspace", "configurations", "growth")],
+        [folder / f"{name}.md" for name in tables],
         [(folder / "figures/whole_workspace.png", caption)],
     )
 

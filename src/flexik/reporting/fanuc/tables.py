@@ -1,5 +1,7 @@
 """Tables of the six-joint arm; percent, mm and degrees."""
 
+import itertools
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,8 @@ NOT_AVAILABLE = "not available"
 DEGREES = 180.0 / np.pi
 # Root mean square error, share of a joint's range, that passes are counted to
 PASS_ERRORS = (0.05, 0.02)
+# Between the rows of the table of conditioning, m
+SINGULAR_EDGES = (0.01, 0.03, 0.1, 0.3)
 
 
 def write_tables(results: Results, folder: Path) -> None:
@@ -106,6 +110,13 @@ def _write_workspace(results: Results, folder: Path) -> None:
         2,
         "The same by arm configuration.",
         [f"reached after k steps: {notes.success(results)}."],
+    )
+    write_table(
+        folder / "conditioning",
+        conditioning(results),
+        1,
+        f"Poses reached (%) by how close to singular they are: {notes.success(results)}.",
+        notes.conditioning(results),
     )
     write_table(
         folder / "growth",
@@ -223,12 +234,7 @@ def off_path(results: Results, column: str, unit: float) -> pd.DataFrame:
 
 def off_path_success(results: Results) -> pd.DataFrame:
     """Share of the targets reached, by distance, in percent."""
-    frame, success = results.off_path, results.success
-    reached = (
-        (frame["within_limits"] == 1)
-        & (frame["position_error"] <= success["position"])
-        & (frame["orientation_error"] <= success["orientation"])
-    )
+    reached = within(results.off_path, results.success)
     return _by_distance(results, 100.0 * reached)
 
 
@@ -265,6 +271,37 @@ def whole_workspace(results: Results) -> pd.DataFrame:
         for name in extra
     ]
     return pd.concat([table, pd.DataFrame(rows)], ignore_index=True) if rows else table
+
+
+def conditioning(results: Results) -> pd.DataFrame:
+    """Share of the poses reached by the smallest singular value of the Jacobian there."""
+    frame = results.workspace
+    edges = [0.0, *SINGULAR_EDGES, np.inf]
+    reached = within(frame, results.success)
+    rows = []
+    for low, high in itertools.pairwise(edges):
+        chosen = (frame["singular_value"] >= low) & (frame["singular_value"] < high)
+        exact = chosen & (frame["method"] == EXACT)
+        upper = "" if np.isinf(high) else f" to {high:g}"
+        row: dict[str, object] = {
+            "smallest singular value (m)": f"{low:g}{upper}" if upper else f"over {low:g}",
+            "poses": int(exact.sum()),
+        }
+        for n_steps in range(results.fanuc.refinement.n_steps + 1):
+            some = chosen & (frame["method"] == WHOLE) & (frame["n_steps"] == n_steps)
+            row[label(WHOLE, n_steps)] = 100.0 * float(reached[some].mean())
+        row[EXACT] = 100.0 * float(reached[exact].mean())
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def within(frame: pd.DataFrame, success: Mapping[str, float]) -> pd.Series:
+    """Whether the pose of each row is reached."""
+    return (
+        (frame["within_limits"] == 1)
+        & (frame["position_error"] <= success["position"])
+        & (frame["orientation_error"] <= success["orientation"])
+    )
 
 
 def configurations(results: Results) -> pd.DataFrame:
