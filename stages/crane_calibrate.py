@@ -11,6 +11,7 @@ from pathlib import Path
 import pandas as pd
 
 from flexik import stage
+from flexik.datasets.crane.provenance import calibration_checksum
 from flexik.datasets.tables import read_csv
 from flexik.errors import DataError
 from flexik.evaluation.conditions import all_conditions
@@ -48,7 +49,12 @@ def main() -> None:
     print(f"ground spring {fit.spring_stiffness:.6g} N m/rad")
     write_json(
         OUTPUT,
-        {"spring_stiffness": fit.spring_stiffness, "uncompensated": statistics(fit.errors)},
+        {
+            "spring_stiffness": fit.spring_stiffness,
+            "uncompensated": statistics(fit.errors),
+            # stages that depend on this file do not watch these parameters themselves
+            "made_with": calibration_checksum(crane),
+        },
     )
 
 

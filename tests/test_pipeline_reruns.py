@@ -113,7 +113,7 @@ WATCHING = [
         {"selected_modular_networks__modular_selected__seed": 2},
         {f"crane_{job}_modular@modular_selected" for job in ("select", "train_selected")},
     ),
-    ({"workspace__seed": 22}, {*JUDGED, "crane_targets"}),
+    ({"workspace__seed": 22}, {"crane_targets"}),
     (
         {"methods__direct__inversion__n_iterations": 501},
         {"crane_evaluate@direct", "crane_tolerance_study"},
@@ -128,7 +128,7 @@ WATCHING = [
     ({"tolerance_study__tolerances": [1.0e-5]}, {"crane_tolerance_study"}),
     (
         {"evaluation__payloads": [120.0, 310.0]},
-        {*JUDGED, "crane_calibrate", "crane_tolerance_study"},
+        {"crane_calibrate"},
     ),
 ]
 

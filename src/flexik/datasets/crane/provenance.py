@@ -8,6 +8,14 @@ from flexik.files import checksum, file_checksum
 from flexik.parameters import parameters_checksum
 
 
+def calibration_checksum(crane: parameters.Crane) -> str:
+    """Checksum of what the ground spring is fitted with: the model and the test conditions."""
+    return checksum(
+        parameters_checksum([crane.geometry, crane.structure, crane.evaluation, crane.calibration]),
+        *_section_checksums(crane),
+    )
+
+
 def grid_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
     """Checksum of everything that determines the training grid."""
     return checksum(_model_checksum(crane, spring_stiffness), parameters_checksum([crane.grid]))
@@ -146,10 +154,13 @@ def _method_parts(
 
 def _model_checksum(crane: parameters.Crane, spring_stiffness: float) -> str:
     """Checksum of the flexible model, section tables included."""
-    beams = crane.structure.beams
-    tables = [getattr(beams, name).section for name in type(beams).model_fields]
     return checksum(
         parameters_checksum([crane.geometry, crane.structure]),
         repr(spring_stiffness),
-        *(file_checksum(table) for table in tables),
+        *_section_checksums(crane),
     )
+
+
+def _section_checksums(crane: parameters.Crane) -> list[str]:
+    beams = crane.structure.beams
+    return [file_checksum(getattr(beams, name).section) for name in type(beams).model_fields]
