@@ -65,7 +65,8 @@ def copy_project(folder: Path) -> None:
         raise DataError(f"{folder}: expected an empty or a new folder")
     for name in listed.stdout.splitlines():
         source, target = ROOT / name, folder / name
-        if source.is_file():  # a tracked file may be deleted in the work tree
+        # the lock is of other parameters, and long: DVC reads and writes it at every stage
+        if source.is_file() and name != "dvc.lock":  # a tracked file may be deleted in the tree
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, target)
     subprocess.run(["git", "init", "--quiet"], cwd=folder, check=True)
