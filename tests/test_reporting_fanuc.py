@@ -1,6 +1,7 @@
 """The report of the six-joint arm: its numbers, notes and files follow from the results."""
 
 import dataclasses
+import importlib.util
 import json
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from fanuc_arm import ARM
 
 from flexik.datasets.fanuc.samples import taught_path
 from flexik.datasets.fanuc.tables import COMMANDED, JOINTS, joint_columns
+from flexik.errors import DataError
 from flexik.evaluation.fanuc.errors import workspace_errors
 from flexik.mechanisms.fanuc import configuration
 from flexik.mechanisms.serial_arm import forward
@@ -174,6 +176,20 @@ def test_what_is_not_published_is_marked_and_what_is_stands_beside(results):
     ]
 
 
+@pytest.mark.parametrize("value", ["-1", "101"])
+def test_published_values_must_be_percentages(tmp_path, monkeypatch, value):
+    spec = importlib.util.spec_from_file_location("stage", ROOT / "stages/fanuc_report.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    path = tmp_path / "total_errors.csv"
+    monkeypatch.setattr(module, "PUBLISHED", path)
+    path.write_text("joint,config1,config2\n1,3.5,\n2,,0\n")
+    assert module.published()["config1"].tolist()[0] == 3.5
+    path.write_text(f"joint,config1,config2\n1,3.5,\n2,,{value}\n")
+    with pytest.raises(DataError, match=rf"config2, joint 2: expected 0 to 100 %, got {value}"):
+        module.published()
+
+
 def test_metrics_have_the_names_others_look_for(results):
     found = metrics(results)
     for name in ("config1", "config2"):
@@ -276,7 +292,9 @@ def test_a_distance_without_targets_leaves_cells_empty(results, tmp_path):
     alone = dataclasses.replace(results, off_path=frame)
     text = " ".join(notes.off_path(alone))
     assert "20 targets at 20 mm are left out" in text and "at 20 mm from the path" not in text
-    write_report(alone, tmp_path, [])
+    tables.write_tables(alone, tmp_path)
+    assert "20 mm" in (tmp_path / "off_path.md").read_text()
+    figures._off_path(alone)
     assert tables.off_path_success(alone)["20 mm"].isna().all()
 
 
