@@ -31,6 +31,7 @@ from flexik.datasets.fanuc.tables import (
     joints_of_rows,
     poses_checksum,
     query_checksum,
+    read_path,
 )
 from flexik.datasets.tables import read_table
 from flexik.errors import DataError, FlexikError
@@ -42,6 +43,8 @@ from flexik.parameters import load_parameters
 from flexik.positioning.fanuc.methods import (
     JointMethod,
     closed_form,
+    interpolated,
+    nearest_sample,
     path_networks,
     refined,
     workspace_networks,
@@ -74,6 +77,9 @@ def methods(fanuc: parameters.Fanuc, arm: SerialArm) -> dict[str, JointMethod]:
     for n_steps in range(steps.n_steps + 1):
         name = f"whole_workspace_refined_{n_steps}" if n_steps else "whole_workspace"
         known[name] = refined(arm, whole, n_steps, steps.damping, steps.orientation_length)
+    training, _ = read_path(DATA / "path.parquet", fanuc)
+    taught = training[["x", "y", "z"]].to_numpy(), joints_of_rows(training)
+    known |= {"nearest_sample": nearest_sample(*taught), "interpolated": interpolated(*taught)}
     return known | {"closed_form": closed_form(arm)}
 
 
@@ -161,7 +167,7 @@ def grow(fanuc: parameters.Fanuc, arm: SerialArm) -> pd.DataFrame:
         method = refined(arm, plain, 3, steps.damping, steps.orientation_length)
         before, after = (
             error_statistics(
-                pd.DataFrame(workspace_errors(arm, target, each(target, number))),
+                pd.DataFrame(workspace_errors(arm, target, number, each(target, number))),
                 fanuc.success.model_dump(),
             )
             for each in (plain, method)
@@ -205,7 +211,8 @@ def main() -> None:
         if "growth" in chosen:
             table = grow(fanuc, arm)
             caption = "Networks of the whole workspace, arm configuration 0; seconds of a core."
-            write_table(OUTPUT / "fanuc_growth", table, 2, caption, [machine])
+            remarks = ["One start each.", machine]
+            write_table(OUTPUT / "fanuc_growth", table, 2, caption, remarks)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,9 @@ Writes data/fanuc/path_errors.parquet, off_path_errors.parquet and workspace_err
 
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
+
 from flexik import stage
 from flexik.datasets.fanuc.tables import (
     OFF_PATH_FIELDS,
@@ -23,7 +26,13 @@ from flexik.datasets.tables import read_table
 from flexik.evaluation.fanuc.judging import errors_beside_path, errors_on_path, errors_on_targets
 from flexik.mechanisms.serial_arm import SerialArm
 from flexik.parameters import load_parameters
-from flexik.positioning.fanuc.methods import closed_form, path_networks, workspace_networks
+from flexik.positioning.fanuc.methods import (
+    closed_form,
+    interpolated,
+    nearest_sample,
+    path_networks,
+    workspace_networks,
+)
 from flexik.positioning.fanuc.networks import load_path_networks, load_workspace_networks
 
 DATA = Path("data/fanuc")
@@ -41,15 +50,19 @@ def main() -> None:
     known = load_workspace_networks(DATA / "workspace_networks", fanuc)
     whole = {"whole_workspace": workspace_networks(arm, known)}
     exact = {"closed_form": closed_form(arm)}
-    _, test = read_path(DATA / "path.parquet", fanuc)
+    training, test = read_path(DATA / "path.parquet", fanuc)
+    taught = training[["x", "y", "z"]].to_numpy(), joints_of_rows(training)
+    of_path |= {"nearest_sample": nearest_sample(*taught), "interpolated": interpolated(*taught)}
     joints, made_with = joints_of_rows(test), evaluation_checksum(fanuc)
     on_path = errors_on_path(arm, of_path | whole | exact, test["share"].to_numpy(), joints)
     write_frame(DATA / "path_errors.parquet", on_path, PATH_ERROR_FIELDS, made_with)
+    path = pd.concat([training, test]).sort_values("share")
     beside = errors_beside_path(
         arm,
         of_path | whole,
         exact,
-        joints,
+        joints_of_rows(path),
+        np.flatnonzero(path["is_test"]),
         fanuc.off_path.distances,
         fanuc.off_path.seed,
         refinement,

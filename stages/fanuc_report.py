@@ -16,6 +16,7 @@ from flexik.datasets.fanuc.tables import (
     CURVE_FIELDS,
     OFF_PATH_FIELDS,
     PATH_ERROR_FIELDS,
+    START_FIELDS,
     STUDY_FIELDS,
     WORKSPACE_FIELDS,
     evaluation_checksum,
@@ -25,7 +26,8 @@ from flexik.datasets.fanuc.tables import (
     read_path,
     study_checksum,
 )
-from flexik.datasets.tables import read_csv, read_table
+from flexik.datasets.tables import Field, read_csv, read_table
+from flexik.errors import DataError
 from flexik.parameters import load_parameters
 from flexik.reporting.fanuc.report import write_report
 from flexik.reporting.fanuc.results import PUBLISHED_NETWORKS, Results
@@ -49,21 +51,36 @@ def main() -> None:
         fanuc=fanuc,
         training=training,
         test=test,
-        curves=pd.concat(
-            read_table(
-                DATA / "curves" / f"{name}.parquet", CURVE_FIELDS, network_checksum(fanuc, name)
-            )
-            for name in fanuc.networks
-        ),
+        curves=of_networks(fanuc, "curves", CURVE_FIELDS),
+        starts=of_networks(fanuc, "starts", START_FIELDS),
         study=read_table(DATA / "study.parquet", STUDY_FIELDS, study_checksum(fanuc)),
         path_errors=read_table(DATA / "path_errors.parquet", PATH_ERROR_FIELDS, made_with),
         off_path=read_table(DATA / "off_path_errors.parquet", OFF_PATH_FIELDS, made_with),
         workspace=read_table(DATA / "workspace_errors.parquet", WORKSPACE_FIELDS, made_with),
-        published=read_csv(PUBLISHED, ("joint", *PUBLISHED_NETWORKS), keys=("joint",)),
+        published=published(),
         times=query_times(fanuc),
         growth=growth(fanuc),
     )
     write_report(results, REPORTS, [PUBLISHED])
+
+
+def of_networks(fanuc: parameters.Fanuc, folder: str, columns: tuple[Field, ...]) -> pd.DataFrame:
+    """What all networks of the path have in `folder`."""
+    return pd.concat(
+        read_table(DATA / folder / f"{name}.parquet", columns, network_checksum(fanuc, name))
+        for name in fanuc.networks
+    )
+
+
+def published() -> pd.DataFrame:
+    """Published total errors; raises DataError unless they are percentages."""
+    table = read_csv(PUBLISHED, ("joint", *PUBLISHED_NETWORKS), keys=("joint",))
+    for name in PUBLISHED_NETWORKS:
+        wrong = table[(table[name] < 0.0) | (table[name] > 100.0)]
+        if len(wrong):
+            joint, value = wrong["joint"].iloc[0], wrong[name].iloc[0]
+            raise DataError(f"{PUBLISHED}: {name}, joint {joint}: expected 0 to 100 %, got {value}")
+    return table
 
 
 def query_times(fanuc: parameters.Fanuc) -> pd.DataFrame:

@@ -161,8 +161,9 @@ def remove_stale(case: str, current: dict[str, set[str]]) -> None:
 
 
 def remove_stale_networks(fanuc: parameters.Fanuc) -> None:
-    """Delete networks of the taught path, and their curves, of names that are no more."""
-    for path in [*(DATA / "fanuc").glob("networks/[!.]*"), *(DATA / "fanuc").glob("curves/[!.]*")]:
+    """Delete networks of the taught path, their curves and errors, of names that are no more."""
+    folders = ("networks", "curves", "starts")
+    for path in [path for name in folders for path in (DATA / "fanuc").glob(f"{name}/[!.]*")]:
         if path.name.removesuffix(".parquet") not in fanuc.networks:
             print(f"removing {path}: its name is not in params.yaml")
             shutil.rmtree(path) if path.is_dir() else path.unlink()

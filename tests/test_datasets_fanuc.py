@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fanuc_arm import ARM, random_joints
+from fanuc_arm import ARM
 
 from flexik.datasets.fanuc import samples
-from flexik.datasets.fanuc.samples import all_configurations, beside, taught_path
+from flexik.datasets.fanuc.samples import all_configurations, beside, nearest_on, taught_path
 from flexik.datasets.fanuc.tables import (
     evaluation_checksum,
     network_checksum,
@@ -20,7 +20,7 @@ from flexik.datasets.fanuc.tables import (
 )
 from flexik.errors import ParameterError
 from flexik.mechanisms.fanuc import canonical, configuration, inverse
-from flexik.mechanisms.serial_arm import forward, jacobian
+from flexik.mechanisms.serial_arm import Pose, forward, jacobian
 from flexik.parameters import load_parameters, overlay, read_yaml, validate
 
 ROOT = Path(__file__).parents[1]
@@ -71,16 +71,54 @@ def test_a_path_beyond_the_limits_is_refused(fanuc):
         taught_path(tight, fanuc.path)
 
 
-def test_targets_beside_a_path_are_at_their_distance():
-    pose = forward(ARM, random_joints(30))
-    moved = beside(pose, [0.0, 0.02, 0.4], seed=1)
-    shift = (moved.position.reshape(3, 30, 3) - pose.position).swapaxes(0, 1)
-    lengths = np.linalg.norm(shift, axis=2)
-    assert lengths == pytest.approx(np.tile([0.0, 0.02, 0.4], (30, 1)), abs=1e-15)
-    # one direction for all distances of a pose, another for another pose
-    assert shift[:, 2] == pytest.approx(20.0 * shift[:, 1], abs=1e-14)
-    assert np.abs(np.mean(shift[:, 2] / 0.4, axis=0)).max() < 0.5
-    assert np.array_equal(moved.rotation[60:], pose.rotation)
+def test_targets_beside_a_path_are_at_their_distance_from_all_of_it(fanuc):
+    pose = forward(ARM, taught_path(ARM, fanuc.path).joints)
+    rows = np.arange(5, 595, 10)
+    distances = [0.0, 0.02, 0.3]
+    found = beside(pose, rows, distances, seed=1)
+    assert np.array_equal(np.bincount(np.searchsorted(distances, found.distance)), [59] * 3)
+    shift = found.pose.position - pose.position[found.row]
+    assert np.linalg.norm(shift, axis=1) == pytest.approx(found.distance, abs=1e-15)
+    # from every point of a path ten times as fine, no nearer than asked for
+    fine = np.concatenate(
+        [pose.position[:-1] + k / 10 * np.diff(pose.position, axis=0) for k in range(10)]
+    )
+    apart = np.linalg.norm(found.pose.position[:, None] - fine, axis=2).min(axis=1)
+    assert (apart >= 0.99 * found.distance - 1e-15).all()
+    tangent = np.gradient(pose.position, axis=0)[found.row]
+    along = np.sum(tangent * shift, axis=1) / np.linalg.norm(tangent, axis=1)
+    assert np.abs(along).max() < 1e-12
+    assert np.array_equal(found.pose.rotation, pose.rotation[found.row])
+
+
+def test_targets_nearer_to_another_part_of_the_path_are_left_out():
+    # a closed ring: its middle is at the radius from all of it, beyond is nearer to the other side
+    turn = np.linspace(0.0, 2.0 * np.pi, 201)
+    ring = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(201)])
+    pose = Pose(np.concatenate([ring + np.array([0.0, 0.0, z]) for z in (0.0, 0.5, -0.5)]), None)
+    pose = pose._replace(rotation=np.tile(np.eye(3), (603, 1, 1)))
+    found = beside(pose, np.arange(10, 190, 10), [0.1, 9.0], seed=1)
+    assert (found.distance == 0.1).sum() == 18
+    far = found.pose.position[found.distance == 9.0]
+    assert (nearest_on(pose.position, far).distance >= 0.99 * 9.0).all()
+
+
+def test_the_nearest_point_of_a_path_by_hand():
+    path = np.array([[0.0, 0, 0], [1, 0, 0], [1, 2, 0]])
+    points = np.array([[0.25, 0.3, 0.0], [-1, 0, 0], [1.5, 1.0, 0.0], [1.0, 3.0, 1.0]])
+    found = nearest_on(path, points)
+    assert found.segment.tolist() == [0, 0, 1, 1]
+    assert found.share == pytest.approx([0.25, 0.0, 0.5, 1.0])
+    assert found.distance == pytest.approx([0.3, 1.0, 0.5, np.sqrt(2.0)])
+
+
+def test_random_joints_keep_limits_of_another_range():
+    shifted = dataclasses.replace(
+        ARM, minimum=(-1.1, *ARM.minimum[1:]), maximum=(6.0, *ARM.maximum[1:])
+    )
+    numbers, joints = all_configurations(shifted, 200, seed=3, role=0)
+    assert shifted.within_limits(joints).all() and joints[:, 0].max() > np.pi
+    assert np.array_equal(configuration(shifted, joints), numbers)
 
 
 def test_random_joints_are_of_their_configuration_and_within_limits():
@@ -125,8 +163,9 @@ CHECKSUMS = {
     ("change", "expected"),
     [
         ({"path": {"seed": 2}}, ["path", "config1", "study", "evaluation"]),
-        ({"networks": {"config1": {"seed": 2}}}, ["config1", "study", "evaluation", "query"]),
-        ({"networks": {"config2": {"seed": 2}}}, ["evaluation", "query"]),
+        ({"networks": {"config1": {"seed": 2}}}, ["config1", "study", "evaluation"]),
+        ({"networks": {"config2": {"n_restarts": 2}}}, ["evaluation"]),
+        ({"networks": {"config2": {"n_hidden": 8}}}, ["evaluation", "query"]),
         ({"trainers": {"back_propagation": {"momentum": 0.8}}}, ["config1", "evaluation"]),
         ({"trainers": {"study": {"momentum": 0.8}}}, ["study"]),
         ({"trainers": {"adam": {"beta_1": 0.8}}}, ["workspace", "evaluation"]),

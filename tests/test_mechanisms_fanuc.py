@@ -16,11 +16,11 @@ from flexik.mechanisms.fanuc import (
     N_CONFIGURATIONS,
     SHOULDER,
     WRIST,
+    admissible,
     canonical,
     check_spherical_wrist,
     configuration,
     inverse,
-    nearest,
     reach,
     wrapped,
 )
@@ -155,22 +155,6 @@ def test_reach_ends_with_the_stretched_arm():
     assert edge.singular[0, :SHOULDER].all() and edge.reached[0, :SHOULDER].all()
 
 
-def test_nearest_takes_the_configuration_the_arm_is_in():
-    joints = random_joints(2000)
-    chosen = nearest(ARM, forward(ARM, joints), joints + 0.01)
-    assert chosen.reached.all()
-    assert np.quantile(np.abs(chosen.joints - joints).max(axis=1), 0.99) < 1e-9
-    far = Pose(np.array([[9.0, 0.0, 0.0]]), np.eye(3)[None])
-    missed = nearest(ARM, far, np.zeros((1, 6)))
-    assert missed.status.tolist() == [OUT_OF_REACH] and np.isnan(missed.joints).all()
-
-
-def test_nearest_says_when_a_limit_is_all_that_is_in_the_way():
-    tight = dataclasses.replace(ARM, minimum=(0.1,) * 6, maximum=(0.2,) * 6)
-    chosen = nearest(tight, forward(ARM, np.full((1, 6), 0.5)), np.zeros((1, 6)))
-    assert chosen.status.tolist() == [ACTUATOR_LIMIT] and np.isnan(chosen.joints).all()
-
-
 angles = st.floats(-1.0, 1.0)
 
 
@@ -178,10 +162,48 @@ angles = st.floats(-1.0, 1.0)
 def test_any_joints_come_back(share):
     joints = np.array([0.5 * (LIMITS.sum(axis=0) + np.array(share) * np.ptp(LIMITS, axis=0))])
     pose = forward(ARM, joints)
-    found = nearest(ARM, pose, joints)
-    assert found.reached.all()
-    errors = pose_errors(pose, forward(ARM, found.joints))
-    assert max(error.max() for error in errors) < 1e-7
+    found = inverse(ARM, pose, joints)
+    assert found.reached.any()
+    for k in np.flatnonzero(found.reached[0]):
+        errors = pose_errors(pose, forward(ARM, found.joints[:, k]))
+        # a joint outside its limits by LIMIT_TOLERANCE is put on them
+        assert max(error.max() for error in errors) < 1e-8
+
+
+@pytest.mark.parametrize("power", range(5, 15))
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_closed_form_is_exact_next_to_the_wrist_singularity(power, sign):
+    joints = random_joints(2000, seed=power)
+    joints[:, 4] = sign * 10.0**-power
+    # no limit to put a joint on
+    free = dataclasses.replace(ARM, minimum=(-20.0,) * 6, maximum=(20.0,) * 6)
+    pose = forward(free, joints)
+    found = inverse(free, pose, joints)
+    assert found.reached.any(axis=1).all()
+    for k in range(N_CONFIGURATIONS):
+        rows = found.reached[:, k]
+        distance, angle = pose_errors(pose.rows(rows), forward(free, found.joints[rows, k]))
+        assert distance.max() < 1e-12 and angle.max() < 3e-12
+
+
+def test_joints_are_turned_to_where_their_limits_admit_them():
+    shifted = dataclasses.replace(
+        ARM,
+        minimum=(-1.1, *ARM.minimum[1:3], 0.5, *ARM.minimum[4:]),
+        maximum=(6.0, *ARM.maximum[1:3], 7.5, *ARM.maximum[4:]),
+    )
+    low, high = np.array(shifted.minimum), np.array(shifted.maximum)
+    drawn = np.random.default_rng(2).uniform(low, high, (500, 6))
+    joints = canonical(shifted, drawn)
+    assert not shifted.within_limits(joints).all()
+    turned = admissible(shifted, joints)
+    assert shifted.within_limits(turned).all()
+    assert np.abs(wrapped(turned - drawn)).max() < 1e-12
+    kept = shifted.within_limits(joints)
+    assert np.array_equal(turned[kept], joints[kept])
+    # joint 2 has no other turn
+    beyond = np.array([[0.0, 3.0, 0.0, 1.0, 0.0, 0.0]])
+    assert np.array_equal(admissible(shifted, beyond), beyond)
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,11 @@ import pytest
 from fanuc_arm import ARM
 
 from flexik.errors import ParameterError
+from flexik.learning.weights import initial_weights
+from flexik.mechanisms.pose_representation import INPUTS, OUTPUTS
 from flexik.mechanisms.serial_arm import SerialArm
 from flexik.parameters import read_yaml, validate
+from flexik.parameters.fanuc import N_OUTPUTS, N_POSE, n_weights
 
 ROOT = Path(__file__).parents[1]
 
@@ -66,6 +69,13 @@ def test_the_arm_is_the_published_one(original):
         ("fanuc.workspace.n_hidden", [], "fanuc.workspace.n_hidden"),
         ("fanuc.workspace.trainer", "nothing", "fanuc.workspace.trainer"),
         ("fanuc.trainers.adam.final_rate", 1.5, "fanuc.trainers.adam.final_rate"),
+        ("fanuc.networks.config1.n_restarts", 0, "fanuc.networks.config1.n_restarts"),
+        ("fanuc.networks.config1.n_hidden", 100, "fanuc.networks.config1.n_hidden: 501 weights"),
+        ("fanuc.study.n_hidden", [2, 200], "fanuc.study.n_hidden.1: 1001 weights"),
+        ("fanuc.path.n_training", 1, "fanuc.path.n_training"),
+        ("fanuc.workspace.n_training", 10, "fanuc.workspace.n_hidden"),
+        ("fanuc.off_path.distances", [0.001, 0.0010000001], "fanuc.off_path.distances.1: prints"),
+        ("fanuc.trainers.study.rate_increase", 1.1, "fanuc.study.trainer"),
         ("fanuc.speed", 1.0, "fanuc.speed"),
     ],
 )
@@ -77,7 +87,16 @@ def test_a_mistake_names_its_key(original, key, value, named):
     ), raised.value
 
 
-def test_a_name_that_is_taken_is_told(original):
+@pytest.mark.parametrize(
+    "name", ["closed_form", "whole_workspace", "opw", "interpolated", "config1_refined_2"]
+)
+def test_a_name_that_is_taken_is_told(original, name):
     network = original["fanuc"]["networks"]["config1"]
-    with pytest.raises(ParameterError, match=r"fanuc\.networks\.closed_form: the name is taken"):
-        validate(changed(original, "fanuc.networks.closed_form", network))
+    with pytest.raises(ParameterError, match=rf"fanuc\.networks\.{name}: the name is taken"):
+        validate(changed(original, f"fanuc.networks.{name}", network))
+
+
+def test_weights_are_counted_as_networks_have_them():
+    assert (len(INPUTS), len(OUTPUTS)) == (N_POSE, N_OUTPUTS)
+    weights = initial_weights(N_POSE, (5, 7), N_OUTPUTS, "tanh", np.random.default_rng(0))
+    assert n_weights(N_POSE, [5, 7], N_OUTPUTS) == sum(matrix.size for matrix in weights)

@@ -1,5 +1,8 @@
 """Methods of the six-joint arm and their errors."""
 
+import dataclasses
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,8 +14,11 @@ from flexik.learning.training import Architecture, BackPropagation, trainer_sett
 from flexik.mechanisms.fanuc import canonical, configuration
 from flexik.mechanisms.pose_representation import joint_outputs, pose_inputs
 from flexik.mechanisms.serial_arm import Pose, forward
+from flexik.parameters import load_parameters
 from flexik.positioning.fanuc.methods import (
     closed_form,
+    interpolated,
+    nearest_sample,
     path_networks,
     refined,
     workspace_networks,
@@ -22,12 +28,15 @@ from flexik.positioning.fanuc.training import (
     TaughtSamples,
     WorkspaceTask,
     error_percent,
+    path_tasks,
+    start_rows,
     study_row,
     train_path,
     train_workspace,
 )
 from flexik.positioning.method import PositioningError
 
+ROOT = Path(__file__).parents[1]
 SUCCESS = {"position": 1e-3, "orientation": 1e-3}
 REFINEMENT = {"damping": 1e-8, "orientation_length": 0.5, "n_steps": 2}
 
@@ -86,7 +95,7 @@ def test_refined_is_the_method_and_steps_after_it(joints):
         return joints + 0.01
 
     errors = [
-        workspace_errors(ARM, target, refined(ARM, rough, n, 1e-8, 0.5)(target, number))
+        workspace_errors(ARM, target, number, refined(ARM, rough, n, 1e-8, 0.5)(target, number))
         for n in range(3)
     ]
     medians = [float(np.median(error["position_error"])) for error in errors]
@@ -95,14 +104,15 @@ def test_refined_is_the_method_and_steps_after_it(joints):
 
 
 def test_errors_are_distances_angles_and_limits(joints):
-    target = forward(ARM, joints)
-    found = workspace_errors(ARM, target, joints)
+    target, number = forward(ARM, joints), configuration(ARM, joints)
+    found = workspace_errors(ARM, target, number, joints)
     assert found["position_error"].max() < 1e-14 and found["orientation_error"].max() < 1e-7
     assert found["within_limits"].all()
     turned = joints.copy()
     turned[:, 5] += 0.25
     turned[0, 3] += 4.0 * np.pi
-    found = workspace_errors(ARM, target, turned)
+    found = workspace_errors(ARM, target, number ^ (np.arange(40) == 3), turned)
+    assert np.flatnonzero(found["in_configuration"] == 0).tolist() == [3]
     assert found["position_error"].max() < 1e-13
     assert found["orientation_error"] == pytest.approx(np.full(40, 0.25))
     assert not found["within_limits"][0] and found["within_limits"][1:].all()
@@ -111,17 +121,18 @@ def test_errors_are_distances_angles_and_limits(joints):
 def test_statistics_by_hand():
     frame = pd.DataFrame(
         {
-            "position_error": [0.0, 1e-4, 2e-3, 1e-4],
-            "orientation_error": [0.0, 5e-4, 0.0, 0.0],
-            "within_limits": [1, 1, 1, 0],
+            "position_error": [0.0, 1e-4, 2e-3, 1e-4, 0.0],
+            "orientation_error": [0.0, 5e-4, 0.0, 0.0, 0.0],
+            "within_limits": [1, 1, 1, 0, 1],
+            "in_configuration": [1, 1, 1, 1, 0],
         }
     )
     found = statistics(frame, SUCCESS)
-    assert found["mean_position_error"] == pytest.approx(5.5e-4)
+    assert found["mean_position_error"] == pytest.approx(4.4e-4)
     assert found["median_position_error"] == pytest.approx(1e-4)
     assert found["max_orientation_error"] == pytest.approx(5e-4)
-    # the third is too far, the fourth beyond its limits
-    assert found["success_rate"] == 0.5 and found["n_targets"] == 4
+    # the third is too far, the fourth beyond its limits, the fifth in another configuration
+    assert found["success_rate"] == 0.4 and found["n_targets"] == 5
 
 
 def exact_and_rough(joints):
@@ -144,7 +155,7 @@ def test_on_the_path_all_methods_have_all_samples(joints):
 def test_beside_the_path_unreachable_targets_are_left_out_for_all(joints):
     rough, exact = exact_and_rough(joints)
     distances = [0.0, 0.01, 5.0]
-    frame = errors_beside_path(ARM, rough, exact, joints, distances, 1, REFINEMENT)
+    frame = errors_beside_path(ARM, rough, exact, joints, np.arange(40), distances, 1, REFINEMENT)
     counts = frame.groupby(["distance", "method", "n_steps"]).size()
     assert set(frame["distance"]) == {0.0, 0.01}
     assert list(counts[0.0].index) == [("exact", 0), ("rough", 0), ("rough", 1), ("rough", 2)]
@@ -203,7 +214,65 @@ def test_the_generalised_delta_rule_learns_the_path(samples):
     assert percent == pytest.approx([100.0 * by_hand])
     row = study_row(task)
     assert row["error_percent"] == pytest.approx(percent[0])
-    assert row["training_error"] == pytest.approx(errors[record.kept])
+    assert row["kept"] == record.kept == int(np.argmin(record.errors))
+    found = network.predict(samples.positions)[:, 0]
+    by_hand = np.mean(np.abs(found - samples.joints[:, 0])) / samples.ranges[0]
+    assert row["training_percent"] == pytest.approx(100.0 * by_hand)
+
+
+def test_a_constant_learning_factor_is_never_lowered(samples):
+    """With the settings of params.yaml a pass is kept whatever its error, until it is infinite."""
+    options = load_parameters(ROOT / "params.yaml").fanuc.trainers["study"].model_dump()
+    options |= {"n_iterations": 30}
+    reasons = {}
+    for factor in (0.4, 1e9):
+        settings = {name: value for name, value in options.items() if name != "kind"}
+        settings |= {"learning_rate": factor, "minimum_rate": factor}
+        trainer = trainer_settings("back_propagation", settings)
+        task = PathTask(samples, (6,), Architecture(6, "logistic"), trainer, seed=1, restart=0)
+        _, record, _ = train_path(task)
+        reasons[factor] = str(record.stop_reason), np.diff(record.errors).max(initial=0.0) > 0.0
+    assert reasons == {0.4: ("iterations", True), 1e9: ("line_search", False)}
+
+
+def test_the_median_start_is_the_middle_of_all(samples):
+    settings = trainer_settings("levenberg_marquardt_accelerated", {"n_iterations": 3})
+    pairs = [(1, 2, 3), (4, 5, 6)]
+    tasks = path_tasks(samples, pairs, Architecture(4, "logistic"), settings, 1, 3)
+    assert [task.restart for task in tasks] == [0, 1, 2, 3, 4, 5]
+    trained = [train_path(task) for task in tasks]
+    rows = start_rows(tasks, trained)
+    assert len(rows) == 18 and set(rows["joint"]) == set(range(1, 7))
+    means = rows.groupby("restart")["error_percent"].mean()
+    (median,) = rows.loc[rows["is_median"] == 1, "restart"].unique()
+    assert means[median] == means.median()
+    expected = error_percent(trained[2 * median + 1][0], samples, (4, 5, 6))
+    chosen = rows[(rows["is_median"] == 1) & (rows["joint"] > 3)]
+    assert chosen["error_percent"].to_numpy() == pytest.approx(expected)
+
+
+def test_look_ups_know_the_samples_and_what_lies_between():
+    positions = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0]])
+    joints = np.array([np.full(6, value) for value in (0.0, 1.0, 3.0)])
+    target = Pose(np.array([[0.3, 0.2, 0.0], [1.0, 0.75, 0.0], [1, 2, 0]]), np.zeros((3, 3, 3)))
+    number = np.zeros(3, dtype=np.int64)
+    found = nearest_sample(positions, joints)(target, number)
+    assert found[:, 0].tolist() == [0.0, 3.0, 3.0]
+    found = interpolated(positions, joints)(target, number)
+    assert found == pytest.approx(np.tile([[0.3], [2.5], [3.0]], 6))
+
+
+def test_networks_turn_joints_to_where_limits_admit_them():
+    low, high = (-1.1, *ARM.minimum[1:]), (6.0, *ARM.maximum[1:])
+    shifted = dataclasses.replace(ARM, minimum=low, maximum=high)
+    joints = canonical(ARM, random_joints(200, seed=4))
+    joints[:, 0] = np.where(joints[:, 0] < -1.1, joints[:, 0] + 2.0 * np.pi, joints[:, 0])
+    joints = joints[(joints[:, 0] < 6.0) & (configuration(ARM, joints) == 0)]
+    target = forward(ARM, joints)
+    known = Known(pose_inputs(target), joint_outputs(ARM, canonical(ARM, joints)))
+    found = workspace_networks(shifted, {0: known})(target, np.zeros(len(joints), dtype=np.int64))
+    assert found[:, 0].max() > np.pi and shifted.within_limits(found).all()
+    assert found == pytest.approx(joints, abs=1e-9)
 
 
 def test_a_workspace_network_learns_poses_of_its_configuration():

@@ -51,19 +51,6 @@ class InverseSolution(NamedTuple):
         return self.status == REACHED
 
 
-class Chosen(NamedTuple):
-    """One configuration a pose: joints (n, 6) in rad, status (n,), singular (n,)."""
-
-    joints: Array
-    status: NDArray[np.int64]
-    singular: NDArray[np.bool_]
-
-    @property
-    def reached(self) -> NDArray[np.bool_]:
-        """Poses that are reached, (n,)."""
-        return self.status == REACHED
-
-
 class _Constants(NamedTuple):
     """Upper arm and forearm in m, angle of the forearm in frame 3, signs of the twists."""
 
@@ -122,24 +109,6 @@ def inverse(arm: SerialArm, target: Pose, near: Array | None = None) -> InverseS
     return InverseSolution(joints, status, singular)
 
 
-def nearest(arm: SerialArm, target: Pose, near: Array) -> Chosen:
-    """Of the configurations that reach `target` (n poses) the one closest to `near` (n, 6), rad.
-
-    Close by the largest joint difference. Where none reaches, the joints are nan and the status is
-    ACTUATOR_LIMIT if one would but for a limit.
-    """
-    near = np.broadcast_to(near, (len(target.position), 6))
-    found = inverse(arm, target, near)
-    distance = np.abs(found.joints - near[:, None]).max(axis=2)
-    best = np.argmin(np.where(found.reached, distance, np.inf), axis=1)
-    rows = np.arange(len(near))
-    any_reached = np.any(found.reached, axis=1)
-    limited = np.any(found.status == ACTUATOR_LIMIT, axis=1)
-    status = np.where(any_reached, REACHED, np.where(limited, ACTUATOR_LIMIT, OUT_OF_REACH))
-    joints = np.where(any_reached[:, None], found.joints[rows, best], np.nan)
-    return Chosen(joints, status, any_reached & found.singular[rows, best])
-
-
 def configuration(arm: SerialArm, joints: Array) -> NDArray[np.int64]:
     """Number (n,) of the arm configuration that `joints` (n, 6) in rad are in."""
     constants = _constants(arm)
@@ -159,13 +128,25 @@ def canonical(arm: SerialArm, joints: Array) -> Array:
     """The same pose in the same configuration with the joints (n, 6), rad, on one turn.
 
     Joint 3 on the turn in which the elbow angle lies in (-pi, pi], so that it does not jump within
-    a configuration; joints 1, 4 and 6 on the turn around 0, where they wrap; limits not applied.
+    a configuration; joints 1, 4 and 6 on the turn around 0, where they wrap; limits not applied,
+    see `admissible`.
     """
     bend = np.asarray(joints, dtype=float)[:, 2] + arm.offset[2] + _constants(arm).fore_angle
     result = wrapped(joints)
     result[:, [1, 4]] = np.asarray(joints)[:, [1, 4]]
     result[:, 2] = wrapped(bend) - _constants(arm).fore_angle - arm.offset[2]
     return result
+
+
+def admissible(arm: SerialArm, joints: Array) -> Array:
+    """`joints` (n, 6), rad, each on the turn within its limits closest to where it is.
+
+    The pose and its configuration stay the same. A joint that no turn brings within its limits
+    stays where it is.
+    """
+    joints = np.asarray(joints, dtype=float)
+    turned, _ = _nearest_turn(arm, joints, joints)
+    return turned
 
 
 def wrapped(angles: Array) -> Array:
@@ -234,15 +215,17 @@ def _turn_wrist(constants: _Constants, wrist: Array, flip: int) -> tuple[Array, 
     side = -1.0 if flip else 1.0
     sine = np.hypot(wrist[:, 0, 2], wrist[:, 1, 2])
     in_line = sine < SINGULAR_SINE
-    cosine = -s4 * s5 * wrist[:, 2, 2]
     theta_4 = np.arctan2(side * s5 * wrist[:, 1, 2], side * s5 * wrist[:, 0, 2])
-    theta_5 = np.arctan2(side * sine, cosine)
-    theta_6 = np.arctan2(-side * s4 * wrist[:, 2, 1], side * s4 * wrist[:, 2, 0])
     # in line only the sum or the difference of joints 4 and 6 counts: joint 4 rests
-    resting = sine < _RESTING_SINE
-    theta_4 = np.where(resting, 0.0, theta_4)
-    first_row = np.arctan2(-np.sign(cosine) * wrist[:, 0, 1], np.sign(cosine) * wrist[:, 0, 0])
-    theta_6 = np.where(resting, first_row, theta_6)
+    theta_4 = np.where(sine < _RESTING_SINE, 0.0, theta_4)
+    theta_5 = np.arctan2(side * sine, -s4 * s5 * wrist[:, 2, 2])
+    # joint 6 from what joints 4 and 5 leave: near a singular pose joint 4 is as uncertain as the
+    # pose makes it, and joint 6 takes it back
+    (c4, n4), (c5, n5) = ((np.cos(theta), np.sin(theta)) for theta in (theta_4, theta_5))
+    x = np.column_stack([c4 * c5, n4 * c5, s4 * n5])
+    y = s4 * s5 * np.column_stack([n4, -c4, np.zeros_like(c4)])
+    rest = np.stack([x, y], axis=1) @ wrist[:, :, :2]
+    theta_6 = np.arctan2(rest[:, 1, 0] - rest[:, 0, 1], rest[:, 0, 0] + rest[:, 1, 1])
     return np.column_stack([theta_4, theta_5, theta_6]), in_line
 
 

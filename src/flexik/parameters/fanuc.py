@@ -1,6 +1,7 @@
 """The section `fanuc` of params.yaml."""
 
 import itertools
+import re
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -18,9 +19,14 @@ from flexik.parameters.trainers import BackPropagation, Trainer
 
 # Names of metrics, methods of their own, and names that DVC's run cache ignores
 TAKEN_NAMES = (
-    *("closed_form", "whole_workspace", "path", "off_path", "study", "size", "nfiles"),
-    *("networks", "trainers"),
+    *("closed_form", "whole_workspace", "nearest_sample", "interpolated", "opw"),
+    *("path", "random_poses", "off_path", "study", "size", "nfiles", "networks", "trainers"),
 )
+# A method with Newton steps after it
+TAKEN_END = re.compile(r"_refined_\d+$")
+# Columns: position; pose and what stands for joints, see mechanisms.pose_representation
+N_POSITION, N_JOINTS, N_POSE, N_OUTPUTS = 3, 6, 12, 9
+MM = 1e3
 
 
 class Joint(Model):
@@ -60,7 +66,7 @@ class Path(Model):
 
     region: Annotated[list[Interval], Field(min_length=6, max_length=6)]
     n_via_points: Annotated[int, Field(ge=3)]
-    n_training: Count
+    n_training: Annotated[int, Field(ge=2)]
     n_test: Count
     seed: Seed
 
@@ -79,6 +85,7 @@ class PathNetwork(Model):
     n_hidden: Count
     activation: Literal["tanh", "logistic"]
     seed: Seed
+    n_restarts: Count
     trainer: Name
 
 
@@ -132,7 +139,7 @@ class Fanuc(Model):
             if low < joint.minimum or high > joint.maximum:
                 raise ValueError(f"path.region.{number}: reaches beyond the limits of the joint")
         for name in self.networks:
-            if name in TAKEN_NAMES:
+            if name in TAKEN_NAMES or TAKEN_END.search(name):
                 raise ValueError(f"networks.{name}: the name is taken")
         trainers = {f"networks.{name}": network.trainer for name, network in self.networks.items()}
         trainers |= {"study": self.study.trainer, "workspace": self.workspace.trainer}
@@ -144,14 +151,50 @@ class Fanuc(Model):
         self._check_study()
         for name in ("n_hidden", "learning_factors"):
             check_entries("study", name, getattr(self.study, name))
-        check_entries("off_path", "distances", self.off_path.distances)
+        distances = self.off_path.distances
+        check_entries("off_path", "distances", distances)
+        for number, pair in enumerate(itertools.pairwise(distances), start=1):
+            one, other = (f"{MM * distance:g} mm" for distance in pair)
+            if one == other:
+                raise ValueError(
+                    f"off_path.distances.{number}: prints as {one}, as the entry before it"
+                )
+        self._check_sizes()
         return self
 
+    def _check_sizes(self) -> None:
+        """No network has more weights than numbers to fit."""
+        n_training = self.path.n_training
+        for name, network in self.networks.items():
+            n_outputs = 1 if network.outputs == "one_joint" else N_JOINTS
+            check_size(
+                f"networks.{name}.n_hidden",
+                n_weights(N_POSITION, [network.n_hidden], n_outputs),
+                n_training * n_outputs,
+                "path.n_training",
+            )
+        for number, size in enumerate(self.study.n_hidden):
+            weights = n_weights(N_POSITION, [size], 1)
+            check_size(f"study.n_hidden.{number}", weights, n_training, "path.n_training")
+        space = self.workspace
+        check_size(
+            "workspace.n_hidden",
+            n_weights(N_POSE, space.n_hidden, N_OUTPUTS),
+            space.n_training * N_OUTPUTS,
+            "workspace.n_training",
+        )
+
     def _check_study(self) -> None:
-        if not isinstance(self.trainers[self.study.trainer], BackPropagation):
+        trainer = self.trainers[self.study.trainer]
+        if not isinstance(trainer, BackPropagation):
             raise ValueError(
                 f"study.trainer: {self.study.trainer!r} is not of kind back_propagation, which "
                 "alone has a learning factor and momentum"
+            )
+        if trainer.rate_increase != 1.0:
+            raise ValueError(
+                f"study.trainer: {self.study.trainer!r} has rate_increase "
+                f"{trainer.rate_increase:g}, expected 1: a factor that stays what it is"
             )
         known = [name for name, each in self.networks.items() if each.outputs == "one_joint"]
         if self.study.network not in known:
@@ -159,6 +202,21 @@ class Fanuc(Model):
                 f"study.network: {self.study.network!r} is no network with one joint as output "
                 f"({', '.join(known) or 'there is none'})"
             )
+
+
+def n_weights(n_inputs: int, n_hidden: list[int], n_outputs: int) -> int:
+    """Weights and biases of a network."""
+    sizes = [n_inputs, *n_hidden, n_outputs]
+    return sum(units * (before + 1) for before, units in itertools.pairwise(sizes))
+
+
+def check_size(key: str, weights: int, numbers: int, samples: str) -> None:
+    """Raise ValueError if there are more `weights` than `numbers` of `samples` to fit."""
+    if weights > numbers:
+        raise ValueError(
+            f"{key}: {weights} weights, more than the {numbers} numbers there are to fit "
+            f"({samples})"
+        )
 
 
 def check_entries(section: str, name: str, values: list[float] | list[int]) -> None:

@@ -8,11 +8,14 @@ from scipy.interpolate import CubicSpline
 
 from flexik import parameters
 from flexik.errors import ParameterError
-from flexik.mechanisms.fanuc import N_CONFIGURATIONS, canonical, configuration
+from flexik.mechanisms.fanuc import N_CONFIGURATIONS, admissible, canonical, configuration
 from flexik.mechanisms.serial_arm import Array, Pose, SerialArm
 
 # Joints drawn at once, and at most, until an arm configuration has its poses
 _DRAW, _MAXIMUM_DRAWN = 50_000, 20_000_000
+# Directions tried for a target beside the path, and the share by which its distance from the path
+# may fall short: the path is known by straight segments
+_DIRECTIONS, _SHORTER = 20, 0.01
 
 
 class TaughtPath(NamedTuple):
@@ -44,22 +47,68 @@ def taught_path(arm: SerialArm, path: parameters.FanucPath) -> TaughtPath:
     return TaughtPath(share, joints, np.diff(passed) > 0)
 
 
-def beside(pose: Pose, distances: list[float], seed: int) -> Pose:
-    """Poses moved by each of `distances`, m, in a random direction; orientation kept.
+class Nearest(NamedTuple):
+    """Nearest points of a path: segment (n,), share of it (n,), distance from it (n,) in m."""
 
-    Returns (n * distances) poses, all of the first distance first; a pose keeps its direction.
+    segment: NDArray[np.int64]
+    share: Array
+    distance: Array
+
+
+def nearest_on(path: Array, points: Array) -> Nearest:
+    """Where `points` (n, 3) are nearest to the straight segments between `path` (m, 3), m."""
+    along = np.diff(path, axis=0)
+    away = points[:, None] - path[None, :-1]
+    squares = np.maximum(np.sum(along**2, axis=1), np.finfo(float).tiny)
+    share = np.clip(np.sum(away * along, axis=2) / squares, 0.0, 1.0)
+    distance = np.linalg.norm(away - share[:, :, None] * along, axis=2)
+    segment = np.argmin(distance, axis=1)
+    rows = np.arange(len(points))
+    return Nearest(segment, share[rows, segment], distance[rows, segment])
+
+
+class Beside(NamedTuple):
+    """Targets beside a path: pose, row (n,) of the sample moved, distance (n,) from the path, m."""
+
+    pose: Pose
+    row: NDArray[np.int64]
+    distance: Array
+
+
+def beside(path: Pose, rows: NDArray[np.int64], distances: list[float], seed: int) -> Beside:
+    """Samples `rows` of `path` moved by each of `distances`, m, away from the path.
+
+    In a random direction at right angles to the path; orientation kept. Of _DIRECTIONS tries the
+    first is taken whose distance from all of the path is the length of the move (to _SHORTER); a
+    sample that has none at a distance is left out there.
     """
     generator = np.random.default_rng(seed)
-    direction = generator.normal(size=pose.position.shape)
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    position = np.concatenate([pose.position + distance * direction for distance in distances])
-    return Pose(position, np.tile(pose.rotation, (len(distances), 1, 1)))
+    tangent = np.gradient(path.position, axis=0)[rows]
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    direction = generator.normal(size=(len(rows), _DIRECTIONS, 3))
+    direction -= np.sum(direction * tangent[:, None], axis=2, keepdims=True) * tangent[:, None]
+    direction /= np.linalg.norm(direction, axis=2, keepdims=True)
+    moved, chosen, lengths = [], [], []
+    for distance in distances:
+        waiting, position = np.ones(len(rows), dtype=bool), path.position[rows]
+        for k in range(_DIRECTIONS):
+            some = np.flatnonzero(waiting)
+            there = path.position[rows[some]] + distance * direction[some, k]
+            apart = nearest_on(path.position, there).distance >= (1.0 - _SHORTER) * distance
+            position[some[apart]] = there[apart]
+            waiting[some[apart]] = False
+        moved.append(position[~waiting])
+        chosen.append(rows[~waiting])
+        lengths.append(np.full(len(chosen[-1]), distance))
+    row = np.concatenate(chosen)
+    return Beside(Pose(np.concatenate(moved), path.rotation[row]), row, np.concatenate(lengths))
 
 
 def random_joints(arm: SerialArm, number: int, n: int, generator: np.random.Generator) -> Array:
-    """Joints (n, 6) in rad, uniform over the limits, of arm configuration `number`, canonical.
+    """Joints (n, 6) in rad, uniform over the limits, of arm configuration `number`.
 
-    Raises ParameterError if the configuration hardly occurs within the limits.
+    Canonical, but for joints that their limits keep off that turn. Raises ParameterError if the
+    configuration hardly occurs within the limits.
     """
     found: list[Array] = []
     n_found = n_drawn = 0
@@ -73,7 +122,7 @@ def random_joints(arm: SerialArm, number: int, n: int, generator: np.random.Gene
         joints = joints[configuration(arm, joints) == number]
         found.append(joints)
         n_found, n_drawn = n_found + len(joints), n_drawn + _DRAW
-    return canonical(arm, np.concatenate(found)[:n])
+    return admissible(arm, canonical(arm, np.concatenate(found)[:n]))
 
 
 def all_configurations(

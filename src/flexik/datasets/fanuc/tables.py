@@ -22,6 +22,7 @@ _ERRORS = (
     Field("position_error", "m", "distance of the end effector from its target"),
     Field("orientation_error", "rad", "angle of the end effector to its target"),
     Field("within_limits", "1", "1 if all commanded joints lie in their limits", "int64"),
+    Field("in_configuration", "1", "1 if they are in the arm configuration asked for", "int64"),
 )
 _NUMBER = Field("configuration", "1", "number of the arm configuration, 0 to 7", "int64")
 _METHOD = Field("method", "1", "name of the method", "string")
@@ -34,19 +35,30 @@ PATH_FIELDS = (
     *_POSITION,
 )
 POSE_FIELDS = (_NUMBER, *_JOINT_FIELDS)
+_RESTART = Field("restart", "1", "number of the start, from 0", "int64")
 CURVE_FIELDS = (
     Field("network", "1", "name of the networks", "string"),
+    _RESTART,
     Field("joint", "1", "number of the joint", "int64"),
     Field("iteration", "1", "passes over the data, 0: before training", "int64"),
     Field("training_error", "1", "root mean square error over the joint's range on the path"),
     Field("test_error", "1", "the same on the test samples"),
 )
+START_FIELDS = (
+    Field("network", "1", "name of the networks", "string"),
+    _RESTART,
+    Field("joint", "1", "number of the joint", "int64"),
+    Field("error_percent", "1", "mean error on the test samples over the joint's range, percent"),
+    Field("kept", "1", "pass with the least training error, whose weights are kept", "int64"),
+    Field("is_median", "1", "1: of the start whose mean error is the median one", "int64"),
+)
 STUDY_FIELDS = (
     Field("varied", "1", "n_hidden or learning_factor", "string"),
     Field("value", "1", "its value"),
-    Field("restart", "1", "number of the start", "int64"),
-    Field("training_error", "1", "root mean square error over the joint's range on the path"),
-    Field("error_percent", "1", "mean error on the test samples over that range, percent"),
+    _RESTART,
+    Field("training_percent", "1", "mean error over the joint's range on the path, percent"),
+    Field("error_percent", "1", "the same on the test samples"),
+    Field("kept", "1", "pass with the least training error, whose weights are kept", "int64"),
     Field("stop_reason", "1", "why the training ended", "string"),
 )
 PATH_ERROR_FIELDS = (
@@ -58,7 +70,7 @@ PATH_ERROR_FIELDS = (
 )
 OFF_PATH_FIELDS = (
     _METHOD,
-    Field("distance", "m", "distance of the target from the path's point it belongs to"),
+    Field("distance", "m", "distance of the target from the path"),
     _STEPS,
     *_ERRORS,
 )
@@ -71,6 +83,7 @@ WORKSPACE_FIELDS = (
         "m",
         "smallest of the Jacobian, orientation rows times the orientation length; 0: singular pose",
     ),
+    Field("singular", "1", "1 if the closed form flags the pose as singular", "int64"),
     *_ERRORS,
 )
 
@@ -146,8 +159,13 @@ def read_path(path: Path | str, fanuc: parameters.Fanuc) -> tuple[pd.DataFrame, 
 def query_checksum(fanuc: parameters.Fanuc) -> str:
     """Checksum of what the time of a query depends on: arm, networks' sizes, Newton steps."""
     space = fanuc.workspace
-    sections = [*fanuc.joints, *fanuc.networks.values(), fanuc.refinement]
-    return checksum(parameters_checksum(sections), repr((space.n_hidden, space.activation)))
+    sizes = [
+        (name, network.outputs, network.n_hidden, network.activation)
+        for name, network in fanuc.networks.items()
+    ]
+    sections = [*fanuc.joints, fanuc.refinement]
+    shapes = (sizes, fanuc.path.n_training, space.n_hidden, space.activation)
+    return checksum(parameters_checksum(sections), repr(shapes))
 
 
 def growth_checksum(fanuc: parameters.Fanuc) -> str:

@@ -26,7 +26,7 @@ def errors_on_path(arm: SerialArm, methods: Methods, share: Array, joints: Array
             "share": share,
             **joint_columns(joints),
             **joint_columns(commanded, COMMANDED),
-            **workspace_errors(arm, target, commanded),
+            **workspace_errors(arm, target, number, commanded),
         }
         frames.append(pd.DataFrame(columns).assign(method=name))
     return pd.concat(frames, ignore_index=True)
@@ -37,22 +37,23 @@ def errors_beside_path(
     methods: Methods,
     exact: Methods,
     joints: Array,
+    rows: NDArray[np.int64],
     distances: list[float],
     seed: int,
     refinement: Mapping[str, float],
 ) -> pd.DataFrame:
-    """Rows of OFF_PATH_FIELDS: targets at `distances`, m, from the poses of `joints` (n, 6).
+    """Rows of OFF_PATH_FIELDS: targets at `distances`, m, from the path of `joints` (n, 6).
 
-    Left out are targets that the arm configuration of the path does not reach; they are missing in
+    They belong to the samples `rows` of the path. Left out are targets that the arm configuration
+    of the path does not reach, and those nearer to another part of the path; they are missing in
     the rows of every method. `methods` are refined too, `exact` ones are not.
     """
-    target = beside(forward(arm, joints), distances, seed)
-    number = np.tile(configuration(arm, joints), len(distances))
-    distance = np.repeat(np.array(distances), len(joints))
-    reached = inverse(arm, target).reached[np.arange(len(number)), number]
-    target, number, distance = target.rows(reached), number[reached], distance[reached]
+    found = beside(forward(arm, joints), rows, distances, seed)
+    number = configuration(arm, joints)[found.row]
+    reached = inverse(arm, found.pose).reached[np.arange(len(number)), number]
+    target, number, distance = found.pose.rows(reached), number[reached], found.distance[reached]
     frames = [
-        pd.DataFrame(workspace_errors(arm, target, method(target, number))).assign(
+        pd.DataFrame(workspace_errors(arm, target, number, method(target, number))).assign(
             method=name, n_steps=np.int64(n_steps), distance=distance
         )
         for name, n_steps, method in _variants(arm, methods, exact, refinement)
@@ -74,12 +75,14 @@ def errors_on_targets(
     """
     target = forward(arm, joints)
     singular = smallest_singular_value(arm, joints, refinement["orientation_length"])
+    flagged = inverse(arm, target).singular[np.arange(len(number)), number]
     frames = [
-        pd.DataFrame(workspace_errors(arm, target, method(target, number))).assign(
+        pd.DataFrame(workspace_errors(arm, target, number, method(target, number))).assign(
             method=name,
             n_steps=np.int64(n_steps),
             configuration=number,
             singular_value=singular,
+            singular=flagged.astype(np.int64),
         )
         for name, n_steps, method in _variants(arm, methods, exact, refinement)
     ]

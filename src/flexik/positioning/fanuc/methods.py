@@ -1,4 +1,4 @@
-"""From poses to joints: networks of a taught path, networks of the whole workspace, closed form.
+"""From poses to joints: networks of a taught path or the whole workspace, closed form, look-ups.
 
 A method takes the targets and the number of the arm configuration that each is asked for, and gives
 joints (n, 6) in rad; nan where it has none.
@@ -9,7 +9,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.mechanisms.fanuc import inverse
+from flexik.datasets.fanuc.samples import nearest_on
+from flexik.mechanisms.fanuc import admissible, inverse
 from flexik.mechanisms.pose_representation import joints_of, pose_inputs
 from flexik.mechanisms.serial_arm import Array, Pose, SerialArm, refine
 from flexik.positioning.method import Network, PositioningError
@@ -25,6 +26,31 @@ def closed_form(arm: SerialArm) -> JointMethod:
         rows = np.arange(len(number))
         reached = found.reached[rows, number]
         return np.where(reached[:, None], found.joints[rows, number], np.nan)
+
+    return method
+
+
+def nearest_sample(positions: Array, joints: Array) -> JointMethod:
+    """Joints of the taught sample nearest in position: what needs no network.
+
+    `positions` (m, 3) in m and `joints` (m, 6) in rad of the samples. Looks neither at the
+    orientation nor at the configuration.
+    """
+
+    def method(target: Pose, number: NDArray[np.int64]) -> Array:
+        distance = np.linalg.norm(target.position[:, None] - positions, axis=2)
+        return joints[np.argmin(distance, axis=1)]
+
+    return method
+
+
+def interpolated(positions: Array, joints: Array) -> JointMethod:
+    """As `nearest_sample`, but linear between two samples that follow one another on the path."""
+
+    def method(target: Pose, number: NDArray[np.int64]) -> Array:
+        there = nearest_on(positions, target.position)
+        before, after = joints[there.segment], joints[there.segment + 1]
+        return before + there.share[:, None] * (after - before)
 
     return method
 
@@ -51,6 +77,8 @@ def path_networks(networks: Mapping[tuple[int, ...], Network]) -> JointMethod:
 def workspace_networks(arm: SerialArm, networks: Mapping[int, Network]) -> JointMethod:
     """One network an arm configuration, from position and orientation.
 
+    Joints turn to where their limits admit them, if a turn is all that is in the way.
+
     Raises PositioningError when asked for a configuration without a network.
     """
 
@@ -61,7 +89,7 @@ def workspace_networks(arm: SerialArm, networks: Mapping[int, Network]) -> Joint
                 raise PositioningError(f"no network for arm configuration {each}")
             rows = number == each
             outputs = networks[int(each)].predict(pose_inputs(target.rows(rows)))
-            joints[rows] = joints_of(arm, outputs, int(each))
+            joints[rows] = admissible(arm, joints_of(arm, outputs, int(each)))
         return joints
 
     return method

@@ -1,13 +1,17 @@
 """How the networks of the six-joint arm learn; each function can run in a process of its own."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import pandas as pd
 
+from flexik.datasets.fanuc.tables import joints_of_rows
 from flexik.learning.perceptron import Network, Quantity
 from flexik.learning.stopping import Stopping
 from flexik.learning.training import Architecture, TrainingRecord, train
+from flexik.mechanisms.fanuc import canonical
 from flexik.mechanisms.pose_representation import INPUTS, OUTPUTS, joint_outputs, pose_inputs
 from flexik.mechanisms.serial_arm import Array, SerialArm, forward
 
@@ -22,6 +26,17 @@ class TaughtSamples:
     joints: Array
     test_positions: Array
     test_joints: Array
+
+    @classmethod
+    def of_tables(cls, training: pd.DataFrame, test: pd.DataFrame) -> Self:
+        """Of tables of datasets.fanuc.tables.PATH_FIELDS."""
+        columns = list("xyz")
+        return cls(
+            training[columns].to_numpy(),
+            joints_of_rows(training),
+            test[columns].to_numpy(),
+            joints_of_rows(test),
+        )
 
     @property
     def ranges(self) -> Array:
@@ -106,7 +121,7 @@ def percent(found: Array, expected: Array, ranges: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class WorkspaceTask:
-    """The network of arm configuration `number`, from canonical joints (n, 6) in rad of it."""
+    """The network of arm configuration `number`, from joints (n, 6) in rad of it."""
 
     arm: SerialArm
     number: int
@@ -120,7 +135,7 @@ def train_workspace(task: WorkspaceTask) -> tuple[Network, TrainingRecord]:
     """Train the network of `task`: pose to what stands for the joints."""
     return train(
         pose_inputs(forward(task.arm, task.joints)),
-        joint_outputs(task.arm, task.joints),
+        joint_outputs(task.arm, canonical(task.arm, task.joints)),
         task.architecture,
         task.settings,
         task.seed,
@@ -130,14 +145,53 @@ def train_workspace(task: WorkspaceTask) -> tuple[Network, TrainingRecord]:
     )
 
 
-def study_row(task: PathTask) -> dict[str, float | str]:
-    """Columns training_error, error_percent and stop_reason of a study, for one joint."""
+def start_rows(
+    tasks: Sequence[PathTask], trained: Sequence[tuple[Network, TrainingRecord, pd.DataFrame]]
+) -> pd.DataFrame:
+    """Columns START_FIELDS without the network's name: a row a start and joint.
+
+    The median start: of the starts in the order of their mean error over the joints the middle
+    one, of two in the middle the better.
+    """
+    n_groups = len({task.joints for task in tasks})
+    rows = [
+        (task.restart // n_groups, joint, error, record.kept)
+        for task, (network, record, _) in zip(tasks, trained, strict=True)
+        for joint, error in zip(
+            task.joints, error_percent(network, task.samples, task.joints), strict=True
+        )
+    ]
+    frame = pd.DataFrame(rows, columns=["restart", "joint", "error_percent", "kept"])
+    order = frame.groupby("restart")["error_percent"].mean().sort_values(kind="stable").index
+    median = order[(len(order) - 1) // 2]
+    return frame.assign(is_median=(frame["restart"] == median).astype(np.int64))
+
+
+def path_tasks(
+    samples: TaughtSamples,
+    groups: Sequence[tuple[int, ...]],
+    architecture: Architecture,
+    settings: Stopping,
+    seed: int,
+    n_restarts: int,
+) -> list[PathTask]:
+    """Networks that give `groups` of joints, all of one start before those of the next."""
+    return [
+        PathTask(samples, joints, architecture, settings, seed, start * len(groups) + k)
+        for start in range(n_restarts)
+        for k, joints in enumerate(groups)
+    ]
+
+
+def study_row(task: PathTask) -> dict[str, float | int | str]:
+    """Columns of a study, for one joint: both errors, the pass kept and why training stopped."""
     network, record, _ = train_path(task, watch=False)
-    column = task.joints[0] - 1
-    found = network.predict(task.samples.positions)[:, 0]
-    squares = (found - task.samples.joints[:, column]) ** 2
+    column = np.array(task.joints) - 1
+    found = network.predict(task.samples.positions)
+    expected, ranges = task.samples.joints[:, column], task.samples.ranges[column]
     return {
-        "training_error": float(np.sqrt(squares.mean()) / task.samples.ranges[column]),
+        "training_percent": float(percent(found, expected, ranges)[0]),
         "error_percent": float(error_percent(network, task.samples, task.joints)[0]),
+        "kept": record.kept,
         "stop_reason": str(record.stop_reason),
     }

@@ -1,8 +1,10 @@
 """Figures of the six-joint arm; mm and degrees."""
 
-from collections.abc import Sequence
+import itertools
 from pathlib import Path
+from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -12,12 +14,21 @@ from matplotlib.ticker import LogLocator
 from flexik.datasets.fanuc.tables import COMMANDED, JOINTS, joints_of_rows
 from flexik.mechanisms.serial_arm import frames
 from flexik.reporting import style
-from flexik.reporting.fanuc import tables
-from flexik.reporting.fanuc.results import EXACT, WHOLE, Results
+from flexik.reporting.fanuc import notes, tables
+from flexik.reporting.fanuc.results import EXACT, LOOKED_UP, WHOLE, Results
 from flexik.reporting.style import MM
 
 DEGREES = 180.0 / np.pi
-COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
+# Of the networks of the path, in their order; more of them in broken lines
+COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.PURPLE)
+LINES = ("-", "--", ":", "-.")
+FIXED = {
+    WHOLE: (style.ORANGE, "-"),
+    EXACT: (style.INK, "-"),
+    LOOKED_UP[0]: (style.GREY, ":"),
+    LOOKED_UP[1]: (style.GREY, "-"),
+}
+DURATION = "share of the path's duration (1)"
 # Errors below are round-off, mm and degrees
 FLOOR = 1e-7
 
@@ -26,7 +37,8 @@ def write_figures(results: Results, folder: Path) -> None:
     """Write all figures."""
     write = style.write_png
     write(folder / "arm.png", _arm, results)
-    write(folder / "training_error.png", _training_error, results)
+    for kind in trainer_kinds(results):
+        write(folder / f"training_error_{kind}.png", _training_error, results, kind)
     write(folder / "path_tracking.png", _path_tracking, results)
     write(folder / "path_tracking_errors.png", _tracking_errors, results)
     write(folder / "study_n_hidden.png", _study, results, "n_hidden")
@@ -36,18 +48,27 @@ def write_figures(results: Results, folder: Path) -> None:
     write(folder / "whole_workspace.png", _whole_workspace, results)
 
 
-def _propagated(results: Results) -> list[str]:
-    """Networks that back-propagation trained."""
+def trainer_kinds(results: Results) -> list[str]:
+    """Kinds of the trainers of the path's networks, each once."""
     fanuc = results.fanuc
-    return [
-        name
-        for name, network in fanuc.networks.items()
-        if fanuc.trainers[network.trainer].kind == "back_propagation"
-    ]
+    return list(dict.fromkeys(fanuc.trainers[n.trainer].kind for n in fanuc.networks.values()))
 
 
-def _colours(names: Sequence[str]) -> dict[str, str]:
-    return {name: COLOURS[k % len(COLOURS)] for k, name in enumerate(names)}
+def _trained_by(results: Results, kind: str) -> list[str]:
+    """Networks that a trainer of `kind` trained."""
+    fanuc = results.fanuc
+    return [n for n, each in fanuc.networks.items() if fanuc.trainers[each.trainer].kind == kind]
+
+
+def _line(results: Results, name: str) -> dict[str, Any]:
+    """Colour and line of a method, the same in all figures."""
+    if name in FIXED:
+        colour, line = FIXED[name]
+    else:
+        number = results.networks.index(name)
+        colour = COLOURS[number % len(COLOURS)]
+        line = LINES[number // len(COLOURS) % len(LINES)]
+    return {"color": colour, "linestyle": line}
 
 
 def _arm(results: Results) -> Figure:
@@ -60,7 +81,6 @@ def _arm(results: Results) -> Figure:
     elbow = links[3] - results.arm.a[2] * turn[3][:, 0]
     base = np.array([0.0, 0.0, results.arm.d[0]])
     points = np.vstack([links[0], base, links[1:3], elbow, links[3:]])
-    points = points[np.r_[0:5, 5 : len(points)]]
     figure = Figure(figsize=(style.WIDTH, 4.2))
     for axes, (a, b), names in zip(
         figure.subplots(1, 2), ((0, 2), (0, 1)), (("x", "z"), ("x", "y")), strict=True
@@ -89,22 +109,29 @@ def _panels(figure: Figure, y_label: str, x_label: str) -> list[Axes]:
     return list(panels.ravel())
 
 
-def _training_error(results: Results) -> Figure:
+def _training_error(results: Results, kind: str) -> Figure:
+    """All starts of the networks that trainers of `kind` trained; the median start in full."""
     figure = Figure(figsize=(style.WIDTH, 8.0))
-    names = _propagated(results)
     panels = _panels(figure, "rms error (% of range)", "passes over the training samples (1)")
+    starts = results.starts
     for number, axes in enumerate(panels, start=1):
-        for name, colour in _colours(names).items():
-            curves = results.curves
-            curve = curves[(curves["network"] == name) & (curves["joint"] == number)]
-            axes.plot(
-                curve["iteration"],
-                100 * curve["training_error"],
-                color=colour,
-                linewidth=0.9,
-                alpha=0.8,
-                label=name,
-            )
+        for name in _trained_by(results, kind):
+            of_name = starts[(starts["network"] == name) & (starts["joint"] == number)]
+            for start, is_median in zip(of_name["restart"], of_name["is_median"], strict=True):
+                curves = results.curves
+                curve = curves[
+                    (curves["network"] == name)
+                    & (curves["joint"] == number)
+                    & (curves["restart"] == start)
+                ]
+                axes.plot(
+                    curve["iteration"],
+                    100 * curve["training_error"],
+                    **_line(results, name),
+                    linewidth=0.9 if is_median else 0.5,
+                    alpha=0.9 if is_median else 0.35,
+                    label=name if is_median else None,
+                )
         axes.set_yscale("log")
         style.true_minus(axes)
     handles = panels[0].get_legend_handles_labels()
@@ -114,20 +141,20 @@ def _training_error(results: Results) -> Figure:
 
 def _path_tracking(results: Results) -> Figure:
     figure = Figure(figsize=(style.WIDTH, 8.0))
-    panels = _panels(figure, "angle (deg)", "share of the path (1)")
-    names = _propagated(results)
+    panels = _panels(figure, "angle (deg)", DURATION)
+    names = _trained_by(results, "back_propagation") or results.networks
     for k, axes in enumerate(panels):
         taught = results.test
         axes.plot(
             taught["share"], DEGREES * taught[JOINTS[k]], color=style.INK, lw=1.4, label="taught"
         )
-        for (name, colour), marker in zip(_colours(names).items(), "+x.*v^", strict=False):
+        for name, marker in zip(names, itertools.cycle("+x.*v^"), strict=False):
             frame = results.path_errors[results.path_errors["method"] == name]
             axes.plot(
                 frame["share"],
                 DEGREES * frame[COMMANDED[k]],
                 marker,
-                color=colour,
+                color=_line(results, name)["color"],
                 markersize=3,
                 markeredgewidth=0.7,
                 label=name,
@@ -138,14 +165,13 @@ def _path_tracking(results: Results) -> Figure:
 
 def _tracking_errors(results: Results) -> Figure:
     figure = Figure(figsize=(style.WIDTH, 8.0))
-    panels = _panels(figure, "error (deg)", "share of the path (1)")
+    panels = _panels(figure, "error (deg)", DURATION)
     for k, axes in enumerate(panels):
-        for name, colour in _colours(results.networks).items():
+        for name in results.of_path:
             frame = results.path_errors[results.path_errors["method"] == name]
             error = DEGREES * np.abs(frame[COMMANDED[k]] - frame[JOINTS[k]])
-            axes.plot(
-                frame["share"], np.maximum(error, FLOOR), color=colour, linewidth=0.9, label=name
-            )
+            line = _line(results, name)
+            axes.plot(frame["share"], np.maximum(error, FLOOR), **line, linewidth=0.9, label=name)
         axes.set_yscale("log")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return figure
@@ -179,7 +205,7 @@ def _study(results: Results, varied: str) -> Figure:
         "s--",
         color=style.ORANGE,
         markersize=4,
-        label="rms training error, median",
+        label="the same on the training samples, median",
     )
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -187,9 +213,8 @@ def _study(results: Results, varied: str) -> Figure:
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.minorticks_off()
     style.true_minus(axes)
-    names = {"n_hidden": "hidden neurons (1)", "learning_factor": "learning factor (1)"}
-    axes.set_xlabel(names[varied])
-    axes.set_ylabel("error (% of range)")
+    axes.set_xlabel(f"{notes.NAMES[varied]} (1)")
+    axes.set_ylabel("mean absolute error (% of range)")
     axes.set_title(f"joint {results.fanuc.study.joint}")
     figure.legend(loc="outside upper center", ncols=2)
     return figure
@@ -198,19 +223,19 @@ def _study(results: Results, varied: str) -> Figure:
 def _path_errors(results: Results) -> Figure:
     figure = Figure(figsize=(style.WIDTH, 6.0))
     panels = figure.subplots(2, 1, sharex=True)
-    names = [*results.networks, WHOLE]
+    names = [*results.of_path, WHOLE]
     kinds = (
         ("position_error", MM, "position error (mm)"),
         ("orientation_error", DEGREES, "orientation error (deg)"),
     )
     for axes, (column, unit, text) in zip(panels, kinds, strict=True):
-        for name, colour in _colours(names).items():
+        for name in names:
             frame = results.path_errors[results.path_errors["method"] == name]
             error = np.maximum(unit * frame[column], FLOOR)
-            axes.plot(frame["share"], error, color=colour, linewidth=1.0, label=name)
+            axes.plot(frame["share"], error, **_line(results, name), linewidth=1.0, label=name)
         axes.set_yscale("log")
         axes.set_ylabel(text)
-    panels[-1].set_xlabel("share of the path (1)")
+    panels[-1].set_xlabel(DURATION)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure
 
@@ -218,7 +243,7 @@ def _path_errors(results: Results) -> Figure:
 def _off_path(results: Results) -> Figure:
     figure = Figure(figsize=(style.WIDTH, 7.0))
     panels = figure.subplots(2, 2, sharex=True).ravel()
-    names = [*results.networks, WHOLE]
+    names = [*results.of_path, WHOLE]
     distances = results.fanuc.off_path.distances
     places = np.arange(len(distances))
     last = results.fanuc.refinement.n_steps
@@ -231,9 +256,10 @@ def _off_path(results: Results) -> Figure:
     )
     for axes, (table, n_steps, text) in zip(panels, contents, strict=True):
         rows = table.set_index("method")
-        for name, colour in _colours(names).items():
+        for name in names:
             values = rows.loc[tables.label(name, n_steps)].to_numpy(dtype=float)
-            axes.plot(places, values, "o-", color=colour, markersize=3.5, label=name)
+            line = _line(results, name)
+            axes.plot(places, values, marker="o", **line, markersize=3.5, label=name)
         axes.set_title(text)
         if "error" in text:
             axes.set_yscale("log")
@@ -255,9 +281,13 @@ def _whole_workspace(results: Results) -> Figure:
         ("position_error", MM, "position error (mm)", success.position),
         ("orientation_error", DEGREES, "orientation error (deg)", success.orientation),
     )
-    curves = [(WHOLE, n_steps) for n_steps in range(results.fanuc.refinement.n_steps + 1)]
+    n_curves = results.fanuc.refinement.n_steps + 1
+    # the colour the method has elsewhere, the more steps the darker
+    shades = mpl.colormaps["Oranges"](np.linspace(0.35, 1.0, n_curves))
+    curves: list[tuple[str, int, Any]] = [(WHOLE, k, shades[k]) for k in range(n_curves)]
+    curves.append((EXACT, 0, FIXED[EXACT][0]))
     for axes, (column, unit, text, limit) in zip(panels, kinds, strict=True):
-        for (name, n_steps), colour in zip([*curves, (EXACT, 0)], COLOURS, strict=False):
+        for name, n_steps, colour in curves:
             chosen = frame[(frame["method"] == name) & (frame["n_steps"] == n_steps)]
             values = np.sort(np.maximum(unit * chosen[column].to_numpy(), FLOOR))
             share = 100.0 * np.arange(1, len(values) + 1) / len(values)

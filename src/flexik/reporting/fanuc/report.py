@@ -7,9 +7,10 @@ from flexik.files import file_checksum, write_json
 from flexik.parameters import parameters_checksum
 from flexik.reporting import page
 from flexik.reporting.fanuc import notes
-from flexik.reporting.fanuc.figures import FLOOR, write_figures
+from flexik.reporting.fanuc.figures import FLOOR, trainer_kinds, write_figures
+from flexik.reporting.fanuc.notes import DEGREES
 from flexik.reporting.fanuc.results import EXACT, WHOLE, Results
-from flexik.reporting.fanuc.tables import DEGREES, write_tables
+from flexik.reporting.fanuc.tables import write_tables
 from flexik.reporting.style import MM
 
 # Digits of metrics: what machines agree on
@@ -32,7 +33,7 @@ def write_report(results: Results, folder: Path, inputs: list[Path]) -> None:
             made_with[f"fanuc.{name}"] = parameters_checksum([part])
     page.page(
         folder / "README.md",
-        "Six-joint arm FANUC M-710i (Hasan 2005)",
+        "Six-joint arm after the FANUC M-710i (Hasan 2005)",
         _sections(results, folder),
         made_with,
         {str(path): file_checksum(path) for path in inputs},
@@ -42,8 +43,9 @@ def write_report(results: Results, folder: Path, inputs: list[Path]) -> None:
 def metrics(results: Results) -> dict[str, float]:
     """Flat; percent, mm and degrees.
 
-    Networks of the path: on the path. Networks of the whole workspace and the closed form: at
-    random poses.
+    path.METHOD: on the path's test samples; random_poses.METHOD: at random poses. METHOD alone is
+    where it belongs: networks of the path on the path (those of the median start), networks of the
+    whole workspace and the closed form at random poses.
     """
     found: dict[str, float] = {}
     for name in results.networks:
@@ -53,6 +55,15 @@ def metrics(results: Results) -> dict[str, float]:
     for name, values in results.on_targets.items():
         found |= _errors(name, values)
         found[f"{name}.success_percent"] = round(100.0 * values["success_rate"], PLACES)
+    for place, by_method in (("path", results.on_path), ("random_poses", results.on_targets)):
+        for name, values in by_method.items():
+            found |= _errors(f"{place}.{name}", values)
+            rate = 100.0 * values["success_rate"]
+            found[f"{place}.{name}.success_percent"] = round(rate, PLACES)
+    for name in results.networks:
+        means = results.start_means[name].dropna()
+        for which, value in (("least", means.min()), ("largest", means.max())):
+            found[f"{name}.{which}_mean_error_percent"] = round(float(value), PLACES)
     counts = results.off_path[results.off_path["method"] == EXACT]
     found["off_path.n_targets"] = len(counts)
     asked = results.fanuc.path.n_test * len(results.fanuc.off_path.distances)
@@ -88,7 +99,8 @@ def _configurations(results: Results, folder: Path) -> page.Section:
         trainer = results.fanuc.trainers[network.trainer]
         lines.append(
             f"- `{name}`: {each}, x, y, z in, {network.n_hidden} {network.activation} neurons, "
-            f"{trainer.kind.replace('_', ' ')}, at most {trainer.n_iterations} passes."
+            f"{trainer.kind.replace('_', ' ')}, at most {trainer.n_iterations} passes, "
+            f"{network.n_restarts} start{'s' if network.n_restarts > 1 else ''}."
         )
     path = results.fanuc.path
     text = (
@@ -98,13 +110,19 @@ def _configurations(results: Results, folder: Path) -> page.Section:
         f"assumed.\n\n{path.n_training} training and {path.n_test} interleaved test samples of one "
         "path.\n\n" + "\n".join(lines)
     )
-    figure = folder / "figures/training_error.png"
-    caption = "Training error of each joint (after figures 5.3 to 5.8)."
+    figures = [
+        (
+            folder / f"figures/training_error_{kind}.png",
+            f"Training error of each joint by {kind.replace('_', ' ')}, all starts, the median one "
+            f"in full{' (after figures 5.3 to 5.8)' if kind == 'back_propagation' else ''}.",
+        )
+        for kind in trainer_kinds(results)
+    ]
     return page.Section(
         "Two configurations of networks",
         text,
         [folder / "total_errors.md", folder / "passes.md"],
-        [(figure, caption)],
+        figures,
     )
 
 
@@ -173,8 +191,7 @@ def _whole(results: Results, folder: Path) -> page.Section:
 def _arm(results: Results, folder: Path) -> page.Section:
     return page.Section(
         "The arm",
-        "FANUC M-710iC/50, the closest public relative of the M-710i. "
-        f"Reached below means {notes.success(results)}.".replace(" below", ""),
+        f"As it stands in params.yaml, with its sources. Reached means {notes.success(results)}.",
         [folder / "joints.md"],
         [(folder / "figures/arm.png", "The arm halfway along the taught path.")],
     )

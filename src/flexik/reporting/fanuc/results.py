@@ -14,6 +14,8 @@ from flexik.positioning.fanuc.training import percent
 
 PUBLISHED_NETWORKS = ("config1", "config2")
 WHOLE, EXACT = "whole_workspace", "closed_form"
+# Of the taught samples, without a network
+LOOKED_UP = ("nearest_sample", "interpolated")
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +23,7 @@ class Results:
     """Tables of the stages (SI units), published values and timings.
 
     training, test : samples of the path
-    curves, study, path_errors, off_path, workspace : see datasets.fanuc.tables
+    curves, starts, study, path_errors, off_path, workspace : see datasets.fanuc.tables
     published : total error percentages, columns joint and a network's name; nan: not available
     times : columns method, microseconds_single, microseconds_batched; only methods that were
         measured with the settings they have now
@@ -32,6 +34,7 @@ class Results:
     training: pd.DataFrame
     test: pd.DataFrame
     curves: pd.DataFrame
+    starts: pd.DataFrame
     study: pd.DataFrame
     path_errors: pd.DataFrame
     off_path: pd.DataFrame
@@ -51,6 +54,18 @@ class Results:
         return list(self.fanuc.networks)
 
     @property
+    def of_path(self) -> list[str]:
+        """Methods that know the taught path alone."""
+        return [*self.networks, *LOOKED_UP]
+
+    @cached_property
+    def start_means(self) -> pd.DataFrame:
+        """Total error, mean over the joints, percent: a row a start, a column a network."""
+        return self.starts.pivot_table(
+            index="restart", columns="network", values="error_percent", aggfunc="mean"
+        )[self.networks]
+
+    @property
     def success(self) -> dict[str, float]:
         """Errors within which a pose counts as reached."""
         return self.fanuc.success.model_dump()
@@ -62,7 +77,10 @@ class Results:
 
     @cached_property
     def error_percents(self) -> dict[str, Array]:
-        """Total error of each joint (6,) in percent by method, on the test samples."""
+        """Total error of each joint (6,) in percent by method, on the test samples.
+
+        Of networks those of the median start.
+        """
         return {
             str(name): percent(
                 frame[list(COMMANDED)].to_numpy(), frame[list(JOINTS)].to_numpy(), self.ranges

@@ -1,25 +1,27 @@
 """Tables of the six-joint arm; percent, mm and degrees."""
 
 import itertools
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from flexik.evaluation.fanuc.errors import statistics
+from flexik.evaluation.fanuc.errors import statistics, within
 from flexik.mechanisms.fanuc import ELBOW, N_CONFIGURATIONS, SHOULDER, WRIST
 from flexik.reporting.fanuc import notes
-from flexik.reporting.fanuc.results import EXACT, PUBLISHED_NETWORKS, WHOLE, Results, label
+from flexik.reporting.fanuc.notes import DEGREES, NAMES, PASS_ERRORS, SINGULAR_EDGES
+from flexik.reporting.fanuc.results import (
+    EXACT,
+    LOOKED_UP,
+    PUBLISHED_NETWORKS,
+    WHOLE,
+    Results,
+    label,
+)
 from flexik.reporting.style import MM
 from flexik.reporting.tables import write_table
 
 NOT_AVAILABLE = "not available"
-DEGREES = 180.0 / np.pi
-# Root mean square error, share of a joint's range, that passes are counted to
-PASS_ERRORS = (0.05, 0.02)
-# Between the rows of the table of conditioning, m
-SINGULAR_EDGES = (0.01, 0.03, 0.1, 0.3)
 
 
 def write_tables(results: Results, folder: Path) -> None:
@@ -41,15 +43,16 @@ def _write_networks(results: Results, folder: Path) -> None:
         folder / "total_errors",
         total_errors(results),
         3,
-        "Total error of each joint on the test samples, percent of its range (after table 5.1).",
+        "Total error of each joint on the test samples, percent of its range (after table 5.1): "
+        "median (least to largest) over the starts.",
         notes.total_errors(results),
     )
     write_table(
         folder / "passes",
         passes(results),
         0,
-        "Passes over the training samples (steps, of Levenberg-Marquardt) until the root mean "
-        "square training error falls below a share of the joint's range; empty: never.",
+        "Passes over the training samples (steps, of Levenberg-Marquardt) from which on the "
+        "root mean square training error stays below a share of the joint's range; empty: never.",
         notes.passes(results),
     )
     write_table(
@@ -67,7 +70,7 @@ def _write_study(results: Results, folder: Path) -> None:
         write_table(
             folder / f"study_{varied}",
             table,
-            dict.fromkeys(table.columns[2:], 3) | {table.columns[0]: decimals},
+            dict.fromkeys(table.columns[2:-1], 3) | {table.columns[0]: decimals},
             f"Joint {results.fanuc.study.joint}: {results.fanuc.study.n_restarts} starts, "
             f"{results.fanuc.trainers[results.fanuc.study.trainer].n_iterations} passes.",
             notes.study(results, varied),
@@ -158,11 +161,24 @@ def total_errors(results: Results) -> pd.DataFrame:
     """A row a joint and one for their mean; the published value beside each configuration."""
     columns: dict[str, list[object]] = {"joint": [*range(1, 7), "mean"]}
     for name in results.networks:
-        values = results.error_percents[name]
-        columns[f"{name} (%)"] = [*values, float(values.mean())]
+        starts = results.starts[results.starts["network"] == name]
+        groups = [starts.loc[starts["joint"] == joint, "error_percent"] for joint in range(1, 7)]
+        columns[f"{name} (%)"] = [
+            _spread(values) for values in [*groups, results.start_means[name].dropna()]
+        ]
         if name in PUBLISHED_NETWORKS:
             columns[f"{name} published"] = published(results.published, name)
+    for name in LOOKED_UP:
+        values = results.error_percents[name]
+        columns[f"{name} (%)"] = [*values, float(values.mean())]
     return pd.DataFrame(columns, dtype=object)
+
+
+def _spread(values: pd.Series) -> str:
+    """Median, and the range of several."""
+    if len(values) == 1:
+        return f"{values.iloc[0]:.3g}"
+    return f"{values.median():.3g} ({values.min():.3g} to {values.max():.3g})"
 
 
 def published(table: pd.DataFrame, name: str) -> list[object]:
@@ -174,15 +190,14 @@ def published(table: pd.DataFrame, name: str) -> list[object]:
 
 
 def passes(results: Results) -> pd.DataFrame:
-    """Passes until the training error of each joint falls below PASS_ERRORS, by network."""
+    """Passes from which on the training error of each joint stays below PASS_ERRORS."""
     columns: dict[str, list[object]] = {"joint": list(range(1, 7))}
-    for name in results.networks:
-        curves = results.curves[results.curves["network"] == name]
-        for error in PASS_ERRORS:
-            below = curves[curves["training_error"] <= error]
-            first = below.groupby("joint")["iteration"].min()
-            counts = [int(first[j]) if j in first.index else None for j in range(1, 7)]
-            columns[f"{name} to {100 * error:g} %"] = [*counts]
+    needed = notes.passes_needed(results)
+    for name, error in itertools.product(results.networks, PASS_ERRORS):
+        some = needed[(needed["network"] == name) & (needed["error"] == error)]
+        medians = some.groupby("joint")["passes"].quantile(0.5, interpolation="higher")
+        counts = [int(medians[j]) if np.isfinite(medians[j]) else None for j in range(1, 7)]
+        columns[f"{name} to {100 * error:g} %"] = [*counts]
     return pd.DataFrame(columns, dtype=object)
 
 
@@ -209,19 +224,19 @@ def _error_rows(by_method: dict[str, dict[str, float]]) -> pd.DataFrame:
 def study(results: Results, varied: str) -> pd.DataFrame:
     """Errors of one joint by what was varied, over the starts."""
     table = results.study[results.study["varied"] == varied]
-    names = {"n_hidden": "hidden neurons", "learning_factor": "learning factor"}
     rows = []
     for value, group in table.groupby("value"):
         errors = group["error_percent"]
         number = int(np.float64(str(value))) if varied == "n_hidden" else value
         rows.append(
             {
-                names[varied]: number,
+                NAMES[varied]: number,
                 "starts": len(group),
                 "median total error (%)": errors.median(),
                 "least (%)": errors.min(),
                 "largest (%)": errors.max(),
-                "median training error (%)": 100.0 * group["training_error"].median(),
+                "median training error (%)": group["training_percent"].median(),
+                "ended early": int((group["stop_reason"] != "iterations").sum()),
             }
         )
     return pd.DataFrame(rows)
@@ -293,15 +308,6 @@ def conditioning(results: Results) -> pd.DataFrame:
         row[EXACT] = 100.0 * float(reached[exact].mean())
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-def within(frame: pd.DataFrame, success: Mapping[str, float]) -> pd.Series:
-    """Whether the pose of each row is reached."""
-    return (
-        (frame["within_limits"] == 1)
-        & (frame["position_error"] <= success["position"])
-        & (frame["orientation_error"] <= success["orientation"])
-    )
 
 
 def configurations(results: Results) -> pd.DataFrame:
