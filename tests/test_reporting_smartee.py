@@ -12,6 +12,7 @@ from flexik.datasets.smartee.poses import (
     ACTUATED_FIELDS,
     ELBOW_FIELDS,
     POSE_FIELDS,
+    corner_poses,
     draw,
     geometry_of,
     inputs_of,
@@ -19,10 +20,16 @@ from flexik.datasets.smartee.poses import (
     path_poses,
 )
 from flexik.errors import DataError
-from flexik.evaluation.smartee.errors import OUTSIDE, error_table, newton_table, outside_poses
+from flexik.evaluation.smartee.errors import (
+    CORNERS,
+    OUTSIDE,
+    error_table,
+    newton_table,
+    outside_poses,
+)
 from flexik.mechanisms.smartee import closure_jacobian, elbow_circles, leg_tip_velocities, leg_tips
 from flexik.mechanisms.smartee_newton import newton_steps
-from flexik.reporting.smartee import notes, tables
+from flexik.reporting.smartee import notes, start_study, tables
 from flexik.reporting.smartee.report import metrics, write_report
 from flexik.reporting.smartee.results import Results, current
 
@@ -37,13 +44,17 @@ OFF = {"network": 1e-3, "best": 1e-4, "centre": 0.1, "previous": 1e-2}
 
 def elbow_errors() -> pd.DataFrame:
     sets = {name: draw(SMARTEE, name) for name in ("validation", "random")}
-    sets |= {OUTSIDE: outside_poses(SMARTEE)[:2], path_name(20): path_poses(SMARTEE, 20)}
+    sets |= {
+        OUTSIDE: outside_poses(SMARTEE)[:2],
+        CORNERS: corner_poses(SMARTEE),
+        path_name(20): path_poses(SMARTEE, 20),
+    }
     frames = []
     for poses_name, (poses, joints) in sets.items():
         for method, off in OFF.items():
             if method == "previous" and poses_name != path_name(20):
                 continue
-            for n_steps in range(6 if method == "centre" else 3):
+            for n_steps in range(7 if method == "centre" else 3):
                 start = joints[..., 2] + off
                 elbows = newton_steps(GEOMETRY, joints[..., :2], start, n_steps)
                 label = (method, n_steps, poses_name)
@@ -77,6 +88,7 @@ def results() -> Results:
         "peak": [3e-3, 0.2, 5e-3],
     }
     training = {"network": ["network"], "restart": [0], "trainer": ["regularised_cg"]}
+    training |= {"stop_reason": ["goal"]}
     times = {
         "trainer": ["regularised_cg"] * 2 + ["unpenalised_cg"] * 2,
         "spread": ["near", "far"] * 2,
@@ -86,6 +98,11 @@ def results() -> Results:
         "long_seconds": [2.0] * 4,
         "long_error": [1e-6, 1e-6, 1e-6, 3e-5],
     }
+    pairs = (
+        start_rows()
+        .query("spread == 'far'")
+        .replace({"regularised_cg": "0.0001, 0.03", "unpenalised_cg": "0.001, 0.3"})
+    )
     query = {
         "method": ["network", "centre", "centre"],
         "n_steps": [2, 1, -1],
@@ -103,7 +120,10 @@ def results() -> Results:
             ]
         ),
         starts=start_rows(),
+        sensitivity=pairs,
+        linear_error=9e-4,
         sizes=pd.DataFrame(sizes | {"worst_selection_error": [4e-3, 3e-3]}),
+        sizes_beside=pd.DataFrame(sizes | {"worst_selection_error": [5e-3, 4e-3]}),
         training=pd.DataFrame(training),
         random=pd.DataFrame(values, columns=names),
         published=pd.DataFrame(published).set_index("quantity"),
@@ -150,16 +170,22 @@ def test_what_newton_steps_come_to_is_told(results):
 
 
 def test_the_claim_about_starts_is_told_as_it_came_out(results):
-    text = " ".join(notes.start_notes(results))
+    text = " ".join(start_study.start_notes(results))
     assert "Starts near: the penalty raises the median error, 2.00 times that without" in text
     assert "Starts far: the penalty lowers the median error, 0.05 times that without" in text
     assert "100 % of the starts succeed with it, 0 % without" in text
-    assert "No run ended in a stationary point" in text
+    assert "All 8 runs ended at their number of iterations, which is a cap" in text
     assert "regularised_cg 1.0, unpenalised_cg 30.0" in text
+    assert "medians of 4 starts, which are few" in text
+    assert "settings that differ: penalty (0.0001 and 1e-30)." in text
+    assert "`regularised_cg` were searched for" in text and "plateau" not in text.split("cap")[0]
     assert "these do not: unpenalised_cg (far)" in text
     stuck = results.starts.assign(stop_reason="stationary")
-    assert "No run ended" not in " ".join(notes.start_notes(replace(results, starts=stuck)))
-    table = tables.starts(results).set_index(["trainer", "start"])
+    assert "is a cap" not in " ".join(start_study.start_notes(replace(results, starts=stuck)))
+    flat = replace(results, linear_error=2.1e-6)
+    assert "unpenalised_cg (near) ends on a plateau" in " ".join(start_study.start_notes(flat))
+    assert "regularised_cg (near) ends on" not in " ".join(start_study.start_notes(results))
+    table = start_study.starts(results).set_index(["trainer", "start"])
     assert table.loc[("unpenalised_cg", "far"), "success (%)"] == 0.0
     assert table.loc[("unpenalised_cg", "far"), "to success"] == ""
 
