@@ -166,7 +166,7 @@ def _figure_newton_steps(curves: Mapping[str, Mapping[int, float]]) -> Figure:
     axes.set_xlabel("Newton steps")
     axes.set_ylabel("peak elbow error (rad)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.legend()
+    figure.legend(loc="outside lower center", ncols=2)
     return figure
 
 

@@ -170,18 +170,17 @@ def outside_notes(results: Results) -> list[str]:
     table = results.of(PUBLISHED, 0, OUTSIDE)
     missed = outside.n_poses - len(table)
     steps, accepted = results.smartee.newton.network_steps, results.smartee.newton.accepted
-    failed, hidden = results.n_failed(steps, OUTSIDE)
+    wrong, hidden, alarms = results.n_wrong(steps, OUTSIDE)
     return [
         "Extent: the largest coordinate of a pose in half extents of the box, uniform up to "
         f"{outside.extent:g}. {missed} of {outside.n_poses} poses are out of reach of the legs and "
         "left out.",
-        f"Right: the elbows of the pose, to {RIGHT:g} rad, and a status that says so; the closure "
-        "equations have other solutions, which Newton's method may find from a start that is far "
-        "off.",
-        f"`{PUBLISHED}` + {steps} steps are not right in {failed} poses: {failed - hidden} are "
-        f"noticed by their status (a closure error above {accepted:g} of the squared side, or an "
-        f"elbow that the joints do not reach), {hidden} close the mechanism in another way, which "
-        "no test of the closure can tell.",
+        f"Right: the elbows of the pose, to {RIGHT:g} rad, and of Newton's method a status that "
+        "says so; the closure equations have other solutions, which it may find from a start that "
+        "is far off.",
+        f"`{PUBLISHED}` + {steps} steps: {wrong} wrong, of which {wrong - hidden} are noticed by "
+        f"their status (a closure error above {accepted:g} of the squared side, or an elbow that "
+        f"the joints do not reach) and {hidden} are not; {alarms} right ones are taken for wrong.",
     ]
 
 
@@ -200,8 +199,8 @@ def newton_notes(results: Results) -> list[str]:
     if any(wrong.values()):
         listed = ", ".join(f"{number} of {poses}" for poses, number in wrong.items() if number)
         found.append(
-            f"Converged to wrong elbows: {listed}. They solve the closure equations within the "
-            "limits of the joints; that they are not the pose's own shows only beside it."
+            f"Converged to wrong elbows: {listed}. They close the mechanism and lie between -pi "
+            "and 0, so no status tells; that they are not the pose's own shows only beside it."
         )
     return found
 
@@ -254,6 +253,11 @@ def size_notes(results: Results) -> list[str]:
                 f"{poses}: selection below training, because it trains on {extents[poses]:g} times "
                 f"the box, whose rim is hardest, and selects on {extents['selection']:g} times."
             )
+    if all(
+        np.argmin(table["selection_error"]) == len(table) - 1
+        for table in (results.sizes, results.sizes_beside)
+    ):
+        found.append("Neither set of rows singles out a size: the error falls as far as was tried.")
     found.append(
         f"The paper took M = {smartee.networks[PUBLISHED].n_hidden}, without saying by what. "
         "Best of the starts by the selection error itself, all runs with one number of iterations."

@@ -49,9 +49,9 @@ def metrics(results: Results) -> dict[str, float | None]:
         for poses, prefix in ((VALIDATION, ""), (RANDOM, "random_")):
             key = f"newton{n_steps}.{prefix}peak_elbow_rad"
             found[key] = results.peak(PUBLISHED, n_steps, poses, "elbow")
-        failed, unnoticed = results.n_failed(n_steps, OUTSIDE)
-        found[f"newton{n_steps}.outside_n_failed"] = failed
-        found[f"newton{n_steps}.outside_n_wrong"] = unnoticed
+        wrong, unnoticed, _ = results.n_wrong(n_steps, OUTSIDE)
+        found[f"newton{n_steps}.outside_n_failed"] = wrong
+        found[f"newton{n_steps}.outside_n_unnoticed"] = unnoticed
     for label, group in results.newton.groupby("poses", sort=False):
         converged = group[group["status"] == CONVERGED]
         found[f"newton.{label}_n_failed"] = int((~right(group)).sum())

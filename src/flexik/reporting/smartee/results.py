@@ -92,14 +92,14 @@ class Results:
         values = self.of(method, n_steps, poses)[QUANTITIES[quantity]].to_numpy()
         return float(self.factor(quantity) * values.max()) if values.size else np.nan
 
-    def n_failed(self, n_steps: int, poses: str) -> tuple[int, int]:
-        """How often PUBLISHED and fixed steps are not right, and how often unnoticed so.
+    def n_wrong(self, n_steps: int, poses: str) -> tuple[int, int, int]:
+        """How often PUBLISHED and fixed steps are wrong, how often unnoticed, and false alarms.
 
         What is noticed has a status that is not CONVERGED.
         """
         table = self.of(PUBLISHED, n_steps, poses)
-        wrong = ~right(table)
-        return int(wrong.sum()), int((wrong & (table["status"] == CONVERGED)).sum())
+        wrong, noticed = ~(table["elbow_error"] <= RIGHT), table["status"] != CONVERGED
+        return int(wrong.sum()), int((wrong & ~noticed).sum()), int((~wrong & noticed).sum())
 
     def factor(self, quantity: str) -> float:
         """Published unit of `quantity` in its SI unit."""

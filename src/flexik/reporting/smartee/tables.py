@@ -11,7 +11,7 @@ from flexik.mechanisms.smartee_newton import CONVERGED
 from flexik.parameters.smartee import BEST, CENTRE, PREVIOUS, PUBLISHED, RANDOM, VALIDATION
 from flexik.reporting.smartee import notes, start_study
 from flexik.reporting.smartee.draws import draw_notes, draws
-from flexik.reporting.smartee.results import QUANTITIES, Results, right, scientific
+from flexik.reporting.smartee.results import QUANTITIES, RIGHT, Results, right, scientific
 from flexik.reporting.tables import write_table
 
 MRAD = 1e3
@@ -227,7 +227,8 @@ def outside(results: Results) -> pd.DataFrame:
             row[f"{name} median (mrad)"] = float(errors.median())
             row[f"{name} peak (mrad)"] = float(errors.max())
             after = _within(results.of(name, steps, OUTSIDE), low, high)
-            row[f"{name} + {steps} steps right (%)"] = 100.0 * float(right(after).mean())
+            share = float((after["elbow_error"] <= RIGHT).mean())
+            row[f"{name} + {steps} steps right (%)"] = 100.0 * share
         part = _within(newton, low, high)
         row["Newton from the centre right (%)"] = 100.0 * float(right(part).mean())
         rows.append(row)
