@@ -4,7 +4,8 @@ Reads params.yaml: smartee.networks and their trainers under smartee.trainers, s
 smartee.path, smartee.outside (and smartee.geometry, smartee.workspace, smartee.poses to know which
 data belong to it); the poses of smartee_generate and the networks of smartee_train.
 Writes data/smartee/errors.parquet and data/smartee/newton.parquet, a row for every method and
-pose: of the validation and the random poses, of the path, and of poses outside the box.
+pose: of the validation and the random poses, of the corners of the box, of the path, and of poses
+outside the box.
 """
 
 from collections.abc import Iterator
@@ -16,6 +17,7 @@ import pandas as pd
 from flexik import parameters, stage
 from flexik.datasets.smartee.poses import (
     POSE_FIELDS,
+    corner_poses,
     geometry_of,
     joints_in,
     path_name,
@@ -26,6 +28,7 @@ from flexik.datasets.smartee.poses import (
 from flexik.datasets.smartee.provenance import evaluation_checksum, network_checksum
 from flexik.datasets.tables import Field, write_table
 from flexik.evaluation.smartee.errors import (
+    CORNERS,
     ERROR_FIELDS,
     NEWTON_FIELDS,
     OUTSIDE,
@@ -35,6 +38,7 @@ from flexik.evaluation.smartee.errors import (
 )
 from flexik.learning.storage import load_network
 from flexik.parameters import load_parameters
+from flexik.parameters.smartee import CENTRE, PREVIOUS
 from flexik.positioning.smartee.direct import (
     Direct,
     along_path,
@@ -56,7 +60,7 @@ def main() -> None:
         table = read_poses(DATA / "poses", smartee, name)
         sets[name] = values(table, POSE_FIELDS), joints_in(table)
     poses, joints, n_missed = outside_poses(smartee)
-    sets[OUTSIDE] = poses, joints
+    sets[OUTSIDE], sets[CORNERS] = (poses, joints), corner_poses(smartee)
     print(f"outside: {n_missed} of {smartee.outside.n_poses} poses out of reach, left out")
     newton = pd.concat(newton_table(smartee, name, *sets[name]) for name in sets)
     write(DATA / "newton.parquet", newton, NEWTON_FIELDS, made_with)
@@ -67,6 +71,8 @@ def main() -> None:
         error_table(smartee, (*label, name), poses, joints, method(joints[..., :2]))
         for name, (poses, joints) in sets.items()
         for label, method in known.items()
+        # beyond the box, Newton from the centre is told by newton.parquet
+        if (name, label[0]) != (OUTSIDE, CENTRE)
     ]
     errors = pd.concat([*tables, *previous(smartee, sets)])
     write(DATA / "errors.parquet", errors, ERROR_FIELDS, made_with)
@@ -83,7 +89,7 @@ def methods(smartee: parameters.SmartEE) -> dict[tuple[str, int], Direct]:
             found[name, n_steps] = by_network(geometry, network, n_steps)
     start = centre_elbows(geometry, smartee.workspace)
     for n_steps in range(newton.shown_steps + 1):
-        found["centre", n_steps] = from_centre(geometry, start, n_steps)
+        found[CENTRE, n_steps] = from_centre(geometry, start, n_steps)
     return found
 
 
@@ -95,7 +101,7 @@ def previous(smartee: parameters.SmartEE, sets: Poses) -> Iterator[pd.DataFrame]
         poses, joints = sets[path_name(n_samples)]
         for n_steps in range(1, smartee.newton.network_steps + 1):
             elbows = along_path(geometry, joints[..., :2], start, n_steps)
-            label = ("previous", n_steps, path_name(n_samples))
+            label = (PREVIOUS, n_steps, path_name(n_samples))
             yield error_table(smartee, label, poses, joints, elbows)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from flexik import parameters, stage
 from flexik.datasets.crane_measured.own import own_campaign
 from flexik.datasets.fanuc.samples import taught_path
-from flexik.datasets.smartee.poses import draw, geometry_of, joints_of, path_poses
+from flexik.datasets.smartee.poses import corner_poses, draw, geometry_of, joints_of, path_poses
 from flexik.errors import DataError, FlexikError, ParameterError
 from flexik.files import write_text
 from flexik.mechanisms.crane import CraneGeometry, check_assembly, smallest_extension
@@ -100,7 +100,7 @@ def check_fanuc(fanuc: parameters.Fanuc) -> None:
 
 
 def check_smartee(smartee: parameters.SmartEE) -> None:
-    """The legs reach the centre of the workspace, every pose that is drawn, and the paths."""
+    """The legs reach the box from centre to corners, every pose that is drawn, and the paths."""
     try:
         for name in smartee.poses:
             draw(smartee, name)
@@ -108,6 +108,7 @@ def check_smartee(smartee: parameters.SmartEE) -> None:
             path_poses(smartee, n_samples)
         centre = np.array([[*smartee.workspace.centre, 0.0, 0.0, 0.0]])
         joints_of(geometry_of(smartee), centre, "smartee.workspace.centre")
+        corner_poses(smartee)
     except ParameterError as error:
         raise ParameterError(f"params.yaml: {error}") from None
 

@@ -21,6 +21,7 @@ from flexik.datasets.smartee.poses import (
     read_poses,
     values,
 )
+from flexik.datasets.smartee.provenance import evaluation_checksum
 from flexik.errors import DataError, ParameterError
 from flexik.mechanisms.smartee import (
     closure,
@@ -141,6 +142,23 @@ def test_paths_begin_at_the_centre_and_stay_in_the_box():
         (("geometry", "plate_radius"), -0.05, "greater than 0"),
         (("outside", "extent"), 1.0, "greater than 1"),
         (("trainers", "published", "penalty_decrease"), 1.0, "less than 1"),
+        (("poses", "validation", "seed"), 3, r"poses\.validation\.seed: 3 is that of poses\.sel"),
+        (("poses", "random", "seed"), 1, r"poses\.random\.seed: 1 is that of poses\.training"),
+        (("poses", "random", "n_poses"), 10**12, "less than or equal to 1000000"),
+        (("outside", "extent"), 1e6, "less than or equal to 100"),
+        (
+            ("networks", "network", "n_hidden"),
+            1000,
+            r"networks\.network\.n_hidden: expected at most",
+        ),
+        (("sizes", "n_hidden", "maximum"), 1000, r"sizes\.n_hidden\.maximum: expected at most 300"),
+        (("path", "n_samples"), [100, 100], r"n_samples\.1: 100 is there twice"),
+        (("path", "cycles"), [1, 2, 3], r"path\.cycles\n.*at least 6 items"),
+        (("newton", "network_steps"), 1, "greater than or equal to 2"),
+        (("starts", "tuned"), ["nobody"], r"starts\.tuned\.0: nobody is not in starts\.trainers"),
+        (("starts", "sensitivity", "trainer"), "lbfgs", "lbfgs is lbfgs, expected regularised_cg"),
+        (("starts", "sensitivity", "spread"), "wide", "there is no spread 'wide'"),
+        (("sizes", "beside"), "random", r"sizes\.beside: random is kept from training"),
     ],
 )
 def test_wrong_parameters_are_named(key, value, message):
@@ -151,6 +169,25 @@ def test_wrong_parameters_are_named(key, value, message):
     inner[key[-1]] = value
     with pytest.raises(ValidationError, match=message):
         SmartEE.model_validate(data)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"newton": {"accepted": 1e-5}},
+        {"path": {"n_samples": [30]}},
+        {"outside": {"seed": 9}},
+        {"poses": {"validation": {"seed": 9}}},
+        {"poses": {"random": {"seed": 9}}},
+        {"networks": {"best": {"seed": 9}}},
+        {"trainers": {"published": {"penalty": 0.1}}},
+        {"workspace": {"centre": [0.0, 0.0, 0.139]}},
+    ],
+    ids=str,
+)
+def test_errors_belong_to_all_that_determines_them(changes):
+    assert evaluation_checksum(small(**changes)) != evaluation_checksum(small())
+    assert evaluation_checksum(small(starts={"seed": 9})) == evaluation_checksum(small())
 
 
 @pytest.mark.parametrize("name", ["validation", "network", "centre"])

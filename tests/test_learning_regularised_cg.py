@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from learning_problems import ARCHITECTURES, dense, some_problem, taught
 from scipy.optimize import minimize
+from scipy.sparse.linalg import cg
 
 from flexik.errors import TrainingError
 from flexik.learning import regularised_cg
@@ -113,6 +114,25 @@ def test_a_round_that_ends_higher_is_taken_back():
     # every round begins at the teacher again, with half the penalty: it ends nearer to it
     ends = minimum.errors[2::2]
     assert len(ends) == 3 and np.all(np.diff(ends) < 0.0)
+    # and its first step is that of a run of its own from there
+    own = run(teacher, problem, penalty=0.5, n_iterations=1, minimum_gradient=0.0)
+    assert minimum.errors[3] == own.errors[1]
+
+
+def test_conjugate_gradients_are_preconditioned_by_the_diagonal(monkeypatch):
+    start, problem = some_problem()
+    penalty, found = 1e-3, []
+
+    def watched(system, right, **options):
+        found.append(options["M"] @ np.ones(right.size))
+        return cg(system, right, **options)
+
+    monkeypatch.setattr(regularised_cg, "cg", watched)
+    run(start, problem, penalty=penalty, n_iterations=1)
+    diagonal = 2.0 / problem.targets.size * problem.curvature_diagonal(start)
+    expected = 1.0 / (np.maximum(diagonal, 1e-4 * diagonal.max()) + 2.0 * penalty)
+    np.testing.assert_allclose(found[0], expected, rtol=1e-12)
+    assert expected.max() > 10.0 * expected.min()
 
 
 def test_a_strong_penalty_pulls_saturated_weights_back_and_lets_them_grow_again():

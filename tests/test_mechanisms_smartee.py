@@ -22,8 +22,11 @@ from flexik.mechanisms.smartee_newton import (
     NOT_CONVERGED,
     OTHER_BRANCH,
     SINGULAR,
+    STATUS_MEANING,
+    closed,
     newton_steps,
     solve_elbows,
+    wrapped,
 )
 from flexik.mechanisms.status import OUT_OF_REACH, REACHED
 
@@ -183,6 +186,39 @@ def test_every_row_of_newton_has_its_own_status():
     np.testing.assert_allclose(found.elbows, elbows, rtol=1e-14)
     assert found.residual[0] < 1e-12 < found.residual[1]
     assert np.isnan(newton_steps(GEOMETRY, actuated, elbows, 1)[1]).all()
+
+
+def test_elbows_a_turn_apart_are_the_same():
+    position, rotation = random_poses(20)
+    joints = inverse(GEOMETRY, position, rotation).joints
+    for turns in (1, -2):
+        start = centre_elbows() + 2.0 * np.pi * turns
+        found = solve_elbows(GEOMETRY, joints[..., :2], start)
+        assert np.all(found.status == CONVERGED)
+        np.testing.assert_allclose(found.elbows, joints[..., 2], atol=1e-12)
+        turned = joints[..., 2] + 2.0 * np.pi * turns
+        assert np.all(closed(GEOMETRY, joints[..., :2], turned, 1e-12)[0] == CONVERGED)
+    angles = np.array([0.0, 3.0, -3.0, 4.0, -7.0])
+    np.testing.assert_allclose(
+        wrapped(angles), [0.0, 3.0, -3.0, 4.0 - 2.0 * np.pi, 2.0 * np.pi - 7.0], atol=1e-15
+    )
+
+
+def test_elbows_however_found_have_a_status():
+    position, rotation = random_poses(4)
+    joints = inverse(GEOMETRY, position, rotation).joints
+    actuated, elbows = joints[..., :2].copy(), joints[..., 2].copy()
+    elbows[1] += 1e-3
+    elbows[2] = np.nan
+    actuated[3, :, 1] += np.pi
+    elbows[3] *= -1.0
+    status, residual = closed(GEOMETRY, actuated, elbows, 1e-9)
+    assert status.tolist() == [CONVERGED, NOT_CONVERGED, SINGULAR, OTHER_BRANCH]
+    assert set(status.tolist()) == set(STATUS_MEANING)
+    assert residual[0] < 1e-13 and 1e-5 < residual[1] < 1e-1 and np.isnan(residual[2])
+    tips = tips_at(np.concatenate([actuated, elbows[..., None]], axis=2))[1]
+    sides = [np.linalg.norm(tips[k] - tips[k - 1]) ** 2 / GEOMETRY.side**2 - 1.0 for k in range(3)]
+    assert residual[1] == pytest.approx(np.abs(sides).max(), rel=1e-9)
 
 
 def test_legs_that_no_plate_joins_do_not_converge():

@@ -12,6 +12,7 @@ from flexik.datasets.smartee.poses import (
     ACTUATED_FIELDS,
     ELBOW_FIELDS,
     POSE_FIELDS,
+    corner_poses,
     draw,
     geometry_of,
     inputs_of,
@@ -19,10 +20,17 @@ from flexik.datasets.smartee.poses import (
     path_poses,
 )
 from flexik.errors import DataError
-from flexik.evaluation.smartee.errors import OUTSIDE, error_table, newton_table, outside_poses
+from flexik.evaluation.smartee.errors import (
+    CORNERS,
+    OUTSIDE,
+    error_table,
+    newton_table,
+    outside_poses,
+)
 from flexik.mechanisms.smartee import closure_jacobian, elbow_circles, leg_tip_velocities, leg_tips
 from flexik.mechanisms.smartee_newton import newton_steps
-from flexik.reporting.smartee import notes, tables
+from flexik.reporting.smartee import notes, start_study, tables
+from flexik.reporting.smartee.draws import draws
 from flexik.reporting.smartee.report import metrics, write_report
 from flexik.reporting.smartee.results import Results, current
 
@@ -37,13 +45,17 @@ OFF = {"network": 1e-3, "best": 1e-4, "centre": 0.1, "previous": 1e-2}
 
 def elbow_errors() -> pd.DataFrame:
     sets = {name: draw(SMARTEE, name) for name in ("validation", "random")}
-    sets |= {OUTSIDE: outside_poses(SMARTEE)[:2], path_name(20): path_poses(SMARTEE, 20)}
+    sets |= {
+        OUTSIDE: outside_poses(SMARTEE)[:2],
+        CORNERS: corner_poses(SMARTEE),
+        path_name(20): path_poses(SMARTEE, 20),
+    }
     frames = []
     for poses_name, (poses, joints) in sets.items():
         for method, off in OFF.items():
             if method == "previous" and poses_name != path_name(20):
                 continue
-            for n_steps in range(6 if method == "centre" else 3):
+            for n_steps in range(7 if method == "centre" else 3):
                 start = joints[..., 2] + off
                 elbows = newton_steps(GEOMETRY, joints[..., :2], start, n_steps)
                 label = (method, n_steps, poses_name)
@@ -77,6 +89,7 @@ def results() -> Results:
         "peak": [3e-3, 0.2, 5e-3],
     }
     training = {"network": ["network"], "restart": [0], "trainer": ["regularised_cg"]}
+    training |= {"stop_reason": ["goal"]}
     times = {
         "trainer": ["regularised_cg"] * 2 + ["unpenalised_cg"] * 2,
         "spread": ["near", "far"] * 2,
@@ -86,6 +99,11 @@ def results() -> Results:
         "long_seconds": [2.0] * 4,
         "long_error": [1e-6, 1e-6, 1e-6, 3e-5],
     }
+    pairs = (
+        start_rows()
+        .query("spread == 'far'")
+        .replace({"regularised_cg": "0.0001, 0.03", "unpenalised_cg": "0.001, 0.3"})
+    )
     query = {
         "method": ["network", "centre", "centre"],
         "n_steps": [2, 1, -1],
@@ -103,7 +121,10 @@ def results() -> Results:
             ]
         ),
         starts=start_rows(),
+        sensitivity=pairs,
+        linear_error=9e-4,
         sizes=pd.DataFrame(sizes | {"worst_selection_error": [4e-3, 3e-3]}),
+        sizes_beside=pd.DataFrame(sizes | {"worst_selection_error": [5e-3, 4e-3]}),
         training=pd.DataFrame(training),
         random=pd.DataFrame(values, columns=names),
         published=pd.DataFrame(published).set_index("quantity"),
@@ -150,16 +171,22 @@ def test_what_newton_steps_come_to_is_told(results):
 
 
 def test_the_claim_about_starts_is_told_as_it_came_out(results):
-    text = " ".join(notes.start_notes(results))
+    text = " ".join(start_study.start_notes(results))
     assert "Starts near: the penalty raises the median error, 2.00 times that without" in text
     assert "Starts far: the penalty lowers the median error, 0.05 times that without" in text
     assert "100 % of the starts succeed with it, 0 % without" in text
-    assert "No run ended in a stationary point" in text
+    assert "All 8 runs ended at their number of iterations, which is a cap" in text
     assert "regularised_cg 1.0, unpenalised_cg 30.0" in text
+    assert "medians of 4 starts, which are few" in text
+    assert "settings that differ: penalty (0.0001 and 1e-30)." in text
+    assert "`regularised_cg` were searched for" in text and "plateau" not in text.split("cap")[0]
     assert "these do not: unpenalised_cg (far)" in text
     stuck = results.starts.assign(stop_reason="stationary")
-    assert "No run ended" not in " ".join(notes.start_notes(replace(results, starts=stuck)))
-    table = tables.starts(results).set_index(["trainer", "start"])
+    assert "is a cap" not in " ".join(start_study.start_notes(replace(results, starts=stuck)))
+    flat = replace(results, linear_error=2.1e-6)
+    assert "unpenalised_cg (near) ends on a plateau" in " ".join(start_study.start_notes(flat))
+    assert "regularised_cg (near) ends on" not in " ".join(start_study.start_notes(results))
+    table = start_study.starts(results).set_index(["trainer", "start"])
     assert table.loc[("unpenalised_cg", "far"), "success (%)"] == 0.0
     assert table.loc[("unpenalised_cg", "far"), "to success"] == ""
 
@@ -191,6 +218,84 @@ def test_errors_outside_are_sorted_by_extent(results):
     assert len(table) == 5
     # the same in every stretch, because every elbow is off by the same
     assert table["network median (mrad)"].to_numpy() == pytest.approx(np.sqrt(3.0), rel=1e-6)
+
+
+def crafted(results):
+    """Newton beyond the box: right, at wrong elbows, out of steps after many, of other branch."""
+    rows = results.newton[results.newton["poses"] == OUTSIDE].iloc[:4].copy()
+    rows["extent"], rows["status"], rows["n_steps"] = 0.5, [0, 0, 1, 3], [5, 7, 50, 60]
+    rows["elbow_error"] = [1e-9, 0.2, 0.3, 3.0]
+    return replace(results, newton=rows)
+
+
+def test_what_newton_finds_is_right_when_its_elbows_are(results):
+    own = crafted(results)
+    assert tables.outside(own)["Newton from the centre right (%)"][0] == 25.0
+    (row,) = tables.newton(own).to_dict("records")
+    assert (row["converged"], row["not converged"], row["other branch"]) == (2, 1, 1)
+    assert (row["to wrong elbows"], row["mean steps"], row["most steps"]) == (1, 6.0, 7)
+    found = metrics(own)
+    assert (found["newton.outside_n_failed"], found["newton.outside_n_wrong"]) == (3, 1)
+    assert "Converged to wrong elbows: 1 of outside." in " ".join(notes.newton_notes(own))
+
+
+def test_fixed_steps_that_go_wrong_are_counted(results):
+    errors = results.errors.copy()
+    table = results.of("network", 2, OUTSIDE)
+    assert results.n_wrong(2, OUTSIDE) == (0, 0, 0)
+    for k, (error, status) in enumerate(((0.2, 1), (0.2, 0), (1e-9, 1), (np.nan, 2))):
+        errors.loc[table.index[k], ["elbow_error", "status"]] = error, status
+    own = replace(results, errors=errors)
+    assert own.n_wrong(2, OUTSIDE) == (3, 1, 1)
+    found = metrics(own)
+    assert (found["newton2.outside_n_failed"], found["newton2.outside_n_unnoticed"]) == (3, 1)
+    assert "3 wrong, of which 2 are noticed" in " ".join(notes.outside_notes(own))
+
+
+def test_draws_tell_how_often_the_goals_are_met(results):
+    table = draws(results).set_index(["network", "error"])
+    # every elbow is off by the same, so every draw has the same peak
+    assert table.loc[("network", "elbow (mrad)"), "median"] == pytest.approx(np.sqrt(3.0))
+    assert table.loc[("network", "elbow (mrad)"), "meets (%)"] == 100.0
+    errors = results.errors.copy()
+    row = results.of("network", 0, "random").index[0]
+    errors.loc[row, "elbow_error"] = 1.0
+    share = draws(replace(results, errors=errors)).set_index(["network", "error"])["meets (%)"]
+    # 12 draws of 12 miss one with (11 / 12)^12
+    assert share["network", "elbow (mrad)"] == pytest.approx(100 * (11 / 12) ** 12, abs=4.0)
+    assert share["network", "all three"] == share["network", "elbow (mrad)"]
+
+
+def test_success_is_counted_at_every_threshold(results):
+    table = start_study.thresholds(results).set_index(["trainer", "start"])
+    assert table.columns.tolist() == [f"{t} (%)" for t in ("2e-05", "1e-05", "5e-06", "2e-06")]
+    assert table.loc[("regularised_cg", "near")].tolist() == [100.0, 100.0, 100.0, 0.0]
+    assert table.loc[("unpenalised_cg", "far")].tolist() == [0.0] * 4
+    text = " ".join(start_study.threshold_notes(results))
+    assert "Starts near, with the penalty against without: 2e-05: 100 % against 100 %" in text
+    assert "2e-06: 0 % against 100 %" in text
+
+
+def test_other_constants_are_told(results):
+    table = start_study.sensitivity(results)
+    assert table["tau"].tolist() == ["0.03", "0.3"]
+    assert table["success (%)"].tolist() == [100.0, 0.0]
+    text = " ".join(start_study.sensitivity_notes(results))
+    assert "0 to 100 %" in text and "1 of the 2 pairs come lower" in text
+
+
+@pytest.mark.parametrize(
+    ("column", "values", "message"),
+    [
+        ("unit", ["rad", "cm", "rad"], "position has unit 'cm', expected mm"),
+        ("peak", [3e-3, 0.0, 5e-3], "position is 0, expected a peak above 0"),
+        ("peak", [3e-3, -0.2, 5e-3], "position is -0.2"),
+        ("peak", [3e-3, np.nan, 5e-3], "position is nan"),
+    ],
+)
+def test_published_peaks_that_cannot_be_are_named(results, column, values, message):
+    with pytest.raises(DataError, match=f"published peaks: {message}"):
+        replace(results, published=results.published.assign(**{column: values}))
 
 
 @pytest.mark.parametrize(

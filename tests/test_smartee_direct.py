@@ -1,12 +1,16 @@
 """Direct kinematics of the SmartEE by network and Newton steps, and how its errors are measured."""
 
+import importlib.util
+
 import numpy as np
+import pandas as pd
 import pytest
-from smartee_case import small
+from smartee_case import ROOT, small
 
 from flexik.datasets.smartee.poses import (
     ACTUATED_FIELDS,
     ELBOW_FIELDS,
+    corner_poses,
     draw,
     geometry_of,
     inputs_of,
@@ -18,6 +22,7 @@ from flexik.evaluation.smartee.errors import (
     error_table,
     errors,
     extent_of,
+    linear_error,
     newton_table,
     outside_poses,
 )
@@ -102,13 +107,60 @@ def test_orientation_error_is_that_of_the_published_arc_cosines():
 
     _, computed = complete_direct(GEOMETRY, joints[..., :2], elbows)
     truth = rotation_zyz(poses[:, 3:])
-    cosines = [
-        np.sum(computed[:, :, k] * truth[:, :, k], axis=1)
-        / np.linalg.norm(computed[:, :, k], axis=1)
-        for k in (2, 0)
-    ]
+    # equation 6 as printed: n x s is not made a unit vector
+    n, s = computed[:, :, 0], computed[:, :, 1]
+    cosines = [np.sum(axis * truth[:, :, k], axis=1) for axis, k in ((np.cross(n, s), 2), (n, 0))]
     expected = np.linalg.norm(np.arccos(cosines), axis=0)
     np.testing.assert_allclose(found["orientation_error"], expected, rtol=1e-6)
+    cosines[0] /= np.linalg.norm(np.cross(n, s), axis=1)
+    expected = np.linalg.norm(np.arccos(cosines), axis=0)
+    np.testing.assert_allclose(found["angle_error"], expected, rtol=1e-6)
+    assert np.all(found["angle_error"] < 0.999 * found["orientation_error"])
+
+
+def test_elbows_a_turn_apart_are_no_error():
+    poses, joints = draw(SMARTEE, "validation")
+    actuated, right = joints[..., :2], joints[..., 2]
+    turned = right + np.array([2.0 * np.pi, -4.0 * np.pi, 0.0])
+    found = errors(GEOMETRY, poses, actuated, right, turned)
+    assert found["elbow_error"].max() < 1e-13
+    half = errors(GEOMETRY, poses, actuated, right, right + np.pi)["elbow_error"]
+    np.testing.assert_allclose(half, np.sqrt(3.0) * np.pi, rtol=1e-12)
+    table = error_table(SMARTEE, ("centre", 2, "validation"), poses, joints, turned)
+    assert (table["status"] == 0).all() and table["residual"].max() < 1e-12
+    table = error_table(SMARTEE, ("centre", 2, "validation"), poses, joints, right + 0.01)
+    assert (table["status"] == 1).all()
+
+
+def test_corners_are_those_of_the_box():
+    poses, joints = corner_poses(SMARTEE)
+    assert poses.shape == (64, 6) and joints.shape == (64, 3, 3)
+    assert len(np.unique(poses.round(9), axis=0)) == 64
+    np.testing.assert_allclose(extent_of(SMARTEE.workspace, poses), 1.0)
+    np.testing.assert_allclose(np.abs(poses[:, 3:]), np.radians(10.0), rtol=1e-9)
+    high = small(workspace={"centre": [0.0, 0.0, 0.17]})
+    with pytest.raises(ParameterError, match=r"smartee\.workspace: corners: the legs do not reach"):
+        corner_poses(high)
+
+
+def test_the_best_linear_map_leaves_what_no_line_takes():
+    inputs = np.linspace(-1.0, 1.0, 2001)[:, None]
+    assert linear_error(inputs, 3.0 * inputs + 2.0) < 1e-25
+    # x^2, normalised 2 x^2 - 1, about its mean: variance 4 (1/5 - 1/9)
+    assert linear_error(inputs, inputs**2) == pytest.approx(16.0 / 45.0, rel=5e-3)
+
+
+def test_a_path_begins_at_the_centre_of_the_box():
+    spec = importlib.util.spec_from_file_location("evaluate", ROOT / "stages/smartee_evaluate.py")
+    evaluate = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(evaluate)
+    smartee = small(path={"n_samples": [200]})
+    poses, joints = path_poses(smartee, 200)
+    table = pd.concat(evaluate.previous(smartee, {"path_200": (poses, joints)}))
+    assert table["n_steps"].unique().tolist() == [1, 2]
+    # the first sample is the centre, where its own elbows leave nothing to do
+    assert table.loc[table["number"] == 0, "elbow_error"].max() < 1e-13
+    assert table["elbow_error"].max() < 1e-2
 
 
 def test_small_angles_keep_their_digits():

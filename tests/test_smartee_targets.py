@@ -41,12 +41,15 @@ def test_newton_finds_every_pose_of_the_box(metrics):
     assert metrics["closure.largest_condition_number"] < 3.2
 
 
-def test_the_penalty_helps_starts_that_are_far_from_the_origin(metrics):
-    share = {
-        (trainer, spread): metrics[f"starts.{trainer}.{spread}.success_share"]
-        for trainer in ("regularised_cg", "unpenalised_cg", "lbfgs")
+def test_starts_far_from_the_origin_cost_most_without_a_penalty(metrics):
+    """Of the same minimiser; how many starts then count as successful is a matter of the cut."""
+    near, far = (
+        {
+            trainer: metrics[f"starts.{trainer}.{spread}.median_error"]
+            for trainer in ("regularised_cg", "unpenalised_cg", "back_propagation_batch")
+        }
         for spread in ("near", "far")
-    }
-    assert share["regularised_cg", "far"] >= 0.8 > 0.5 > share["unpenalised_cg", "far"]
-    assert share["regularised_cg", "far"] > share["lbfgs", "far"]
-    assert share["unpenalised_cg", "near"] > 0.8
+    )
+    cost = {trainer: far[trainer] / near[trainer] for trainer in near}
+    assert cost["regularised_cg"] < cost["unpenalised_cg"]
+    assert cost["regularised_cg"] < cost["back_propagation_batch"]

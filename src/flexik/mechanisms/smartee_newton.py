@@ -101,10 +101,30 @@ def solve_elbows(
         elbows[open_rows] -= change[regular]
         steps[open_rows] += 1
     # angles a turn apart are the same elbow
-    elbows = np.remainder(elbows + np.pi, 2.0 * np.pi) - np.pi
+    elbows = wrapped(elbows)
     other = (status == CONVERGED) & (elbows >= 0.0).any(axis=1)
     status[other] = OTHER_BRANCH
     return Direct(elbows, status, steps, residual)
+
+
+def closed(
+    geometry: SmartEEGeometry, actuated: Array, elbows: Array, tolerance: float
+) -> tuple[NDArray[np.int64], Array]:
+    """Status (n,) of `elbows` (n, 3) however they were found, and their residual (n,), see Direct.
+
+    Elbows of a singular step are NaN and SINGULAR, their residual NaN.
+    """
+    tips = leg_tips(elbow_circles(geometry, actuated), elbows)
+    residual = np.abs(closure(tips, geometry.side)).max(axis=1) / geometry.side**2
+    status = np.where(residual <= tolerance, CONVERGED, NOT_CONVERGED)
+    status[np.isnan(residual)] = SINGULAR
+    status[(status == CONVERGED) & (wrapped(elbows) >= 0.0).any(axis=1)] = OTHER_BRANCH
+    return status, residual
+
+
+def wrapped(angles: Array) -> Array:
+    """`angles` (rad) in [-pi, pi)."""
+    return np.remainder(angles + np.pi, 2.0 * np.pi) - np.pi
 
 
 def _step(circles: ElbowCircles, elbows: Array, tips: Array, side: float) -> Array:

@@ -1,5 +1,6 @@
 """Poses of the SmartEE and the joint angles that belong to them: what is learnt and judged by."""
 
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -137,6 +138,15 @@ def path_poses(smartee: parameters.SmartEE, n_samples: int) -> tuple[Array, Arra
     phase = 2.0 * np.pi * np.arange(n_samples)[:, None] / n_samples
     poses = in_box(smartee.workspace, np.sin(phase * np.array(smartee.path.cycles)))
     return poses, joints_of(geometry_of(smartee), poses, "smartee.path")
+
+
+def corner_poses(smartee: parameters.SmartEE) -> tuple[Array, Array]:
+    """The 64 corners (64, 6) of the box and their joints (64, 3, 3).
+
+    Raises ParameterError when the legs do not reach one of them.
+    """
+    poses = in_box(smartee.workspace, np.array(list(itertools.product((-1.0, 1.0), repeat=6))))
+    return poses, joints_of(geometry_of(smartee), poses, "smartee.workspace: corners")
 
 
 def read_poses(folder: Path, smartee: parameters.SmartEE, name: str) -> pd.DataFrame:

@@ -30,15 +30,21 @@ def starts_checksum(smartee: parameters.SmartEE) -> str:
     return checksum(
         poses_checksum(smartee, starts.poses),
         poses_checksum(smartee, "validation"),
-        parameters_checksum([starts, *(smartee.trainers[name] for name in starts.trainers)]),
+        parameters_checksum(
+            [
+                starts,
+                *(smartee.trainers[name] for name in starts.trainers),
+                smartee.trainers[starts.sensitivity.trainer],
+            ]
+        ),
     )
 
 
-def sizes_checksum(smartee: parameters.SmartEE) -> str:
-    """Checksum of everything that determines the study of sizes."""
+def sizes_checksum(smartee: parameters.SmartEE, poses: str) -> str:
+    """Checksum of everything that determines the study of sizes on the rows of `poses`."""
     sizes = smartee.sizes
     return checksum(
-        poses_checksum(smartee, sizes.poses),
+        poses_checksum(smartee, poses),
         poses_checksum(smartee, "selection"),
         parameters_checksum([sizes, smartee.trainers[sizes.trainer]]),
     )

@@ -91,21 +91,22 @@ def outside(path: Path | str, curves: Mapping[str, pd.DataFrame], n_bins: int) -
     style.write_png(path, _figure_outside, curves, n_bins)
 
 
-def sizes(path: Path | str, table: pd.DataFrame, published: int) -> None:
+def sizes(path: Path | str, tables: Mapping[str, pd.DataFrame], published: int) -> None:
     """Training and selection error against the number of hidden neurons.
 
     Parameters
     ----------
     path
         PNG to write.
-    table
-        Frame of learning.size_selection.by_size.
+    tables
+        Frames of learning.size_selection.by_size, by the poses learnt from.
     published
         Number of neurons to mark.
     """
     columns = ("n_hidden", "training_error", "selection_error", "worst_selection_error")
-    style.require("study of sizes", table.columns, columns)
-    style.write_png(path, _figure_sizes, table, published)
+    for table in tables.values():
+        style.require("study of sizes", table.columns, columns)
+    style.write_png(path, _figure_sizes, tables, published)
 
 
 def _figure_pose_errors(
@@ -165,7 +166,7 @@ def _figure_newton_steps(curves: Mapping[str, Mapping[int, float]]) -> Figure:
     axes.set_xlabel("Newton steps")
     axes.set_ylabel("peak elbow error (rad)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.legend()
+    figure.legend(loc="outside lower center", ncols=2)
     return figure
 
 
@@ -206,16 +207,19 @@ def _figure_outside(curves: Mapping[str, pd.DataFrame], n_bins: int) -> Figure:
     return figure
 
 
-def _figure_sizes(table: pd.DataFrame, published: int) -> Figure:
+def _figure_sizes(tables: Mapping[str, pd.DataFrame], published: int) -> Figure:
     figure = Figure(figsize=(style.WIDTH, 4.0))
     axes = figure.add_subplot()
-    x = table["n_hidden"]
-    for column, label, colour, dash in (
-        ("training_error", "training", style.GREY, "--"),
-        ("selection_error", "selection, best start", style.BLUE, "-"),
-        ("worst_selection_error", "selection, worst start", style.SKY, ":"),
-    ):
-        axes.plot(x, table[column], marker="o", color=colour, linestyle=dash, label=label)
+    x: list[int] = []
+    for colour, (poses, table) in zip(COLOURS, tables.items(), strict=False):
+        x = table["n_hidden"].tolist()
+        for column, label, dash in (
+            ("training_error", "training error", "--"),
+            ("selection_error", "selection, best start", "-"),
+            ("worst_selection_error", "selection, worst start", ":"),
+        ):
+            name = f"{poses}: {label}"
+            axes.plot(x, table[column], marker="o", color=colour, linestyle=dash, label=name)
     axes.axvline(published, color=style.INK, linestyle="--", linewidth=1.0, label="published M")
     axes.set_yscale("log")
     axes.set_xlabel("hidden neurons M")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from flexik.datasets.smartee.poses import geometry_of, path_name
-from flexik.evaluation.smartee.errors import OUTSIDE
+from flexik.evaluation.smartee.errors import CORNERS, OUTSIDE
 from flexik.files import write_json
 from flexik.learning.starts import by_trainer
 from flexik.mechanisms.smartee import inverse, rotation_zyz
@@ -16,7 +16,8 @@ from flexik.parameters import parameters_checksum
 from flexik.parameters.smartee import BEST, CENTRE, PREVIOUS, PUBLISHED, RANDOM, VALIDATION
 from flexik.reporting import page
 from flexik.reporting.smartee import figures, schematic
-from flexik.reporting.smartee.results import QUANTITIES, Results
+from flexik.reporting.smartee.draws import draws
+from flexik.reporting.smartee.results import QUANTITIES, Results, right
 from flexik.reporting.smartee.tables import write_tables
 
 # Pose of the picture, in half extents of the box: x, y, z, ZYZ angles
@@ -36,17 +37,25 @@ def metrics(results: Results) -> dict[str, float | None]:
     """Flat, four digits; null for what is not finite."""
     found: dict[str, float] = {}
     for name in results.smartee.networks:
-        for poses, prefix in ((VALIDATION, ""), (RANDOM, "random_")):
+        for poses, prefix in ((VALIDATION, ""), (RANDOM, "random_"), (CORNERS, "corners_")):
             for quantity in QUANTITIES:
                 key = f"{name}.{prefix}peak_{quantity}_{results.unit(quantity)}"
                 found[key] = results.peak(name, 0, poses, quantity)
+    for name, share in (
+        draws(results).query("error == 'all three'")[["network", "meets (%)"]].values
+    ):
+        found[f"{name}.draws_share"] = 0.01 * share
     for n_steps in range(1, results.smartee.newton.network_steps + 1):
         for poses, prefix in ((VALIDATION, ""), (RANDOM, "random_")):
             key = f"newton{n_steps}.{prefix}peak_elbow_rad"
             found[key] = results.peak(PUBLISHED, n_steps, poses, "elbow")
+        wrong, unnoticed, _ = results.n_wrong(n_steps, OUTSIDE)
+        found[f"newton{n_steps}.outside_n_failed"] = wrong
+        found[f"newton{n_steps}.outside_n_unnoticed"] = unnoticed
     for label, group in results.newton.groupby("poses", sort=False):
-        found[f"newton.{label}_n_failed"] = int((group["status"] != CONVERGED).sum())
         converged = group[group["status"] == CONVERGED]
+        found[f"newton.{label}_n_failed"] = int((~right(group)).sum())
+        found[f"newton.{label}_n_wrong"] = int((~right(converged)).sum())
         found[f"newton.{label}_mean_steps"] = float(converged["n_steps"].mean())
     for row in by_trainer(results.starts).to_dict("records"):
         key = f"starts.{row['trainer']}.{row['spread']}"
@@ -85,7 +94,8 @@ def _write_figures(results: Results, folder: Path) -> None:
         for n_steps in (0, steps)
     }
     figures.outside(folder / "outside.png", outside, smartee.outside.n_bins)
-    figures.sizes(folder / "sizes.png", results.sizes, smartee.networks[PUBLISHED].n_hidden)
+    sizes = {smartee.sizes.poses: results.sizes, smartee.sizes.beside: results.sizes_beside}
+    figures.sizes(folder / "sizes.png", sizes, smartee.networks[PUBLISHED].n_hidden)
 
 
 def _drawn_joints(results: Results) -> np.ndarray:
@@ -123,12 +133,13 @@ def _write_page(results: Results, folder: Path, inputs: Mapping[str, str]) -> No
             "Three legs carry a plate; pitch and roll of each leg's first link are actuated, the "
             "elbows are passive. The networks map the six actuated angles to the three elbows, "
             "from which the pose follows in closed form.",
+            [folder / "other_geometries.md"],
             figures=[(shown / "mechanism.png", "The SmartEE; dashed: where a tip can be.")],
         ),
         page.Section(
             "Errors of the networks",
             "",
-            [folder / "peaks.md", folder / "training.md"],
+            [folder / "peaks.md", folder / "draws.md", folder / "training.md"],
             [
                 (
                     shown / f"{quantity}_errors.png",
@@ -147,14 +158,26 @@ def _write_page(results: Results, folder: Path, inputs: Mapping[str, str]) -> No
             "Initial weights",
             "The paper proposes a weight penalty that fades, against local minima far from the "
             "origin of the weights.",
-            [folder / "starts.md"],
-            [(shown / "starts.png", "Errors the starts end with.")],
+            [folder / f"{name}.md" for name in ("starts", "thresholds", "sensitivity")],
+            [
+                (
+                    shown / "starts.png",
+                    "Errors the starts end with. Success is a cut through curves that are steep: "
+                    "a little to the side the shares are others.",
+                )
+            ],
         ),
         page.Section(
             "Outside the box",
             "",
             [folder / "outside.md"],
-            [(shown / "outside.png", "Elbow error inside the box and beyond.")],
+            [
+                (
+                    shown / "outside.png",
+                    "Elbow error inside the box and beyond, angles a turn apart taken for the "
+                    f"same. What is below {figures.LEAST:g} rad is rounding and drawn there.",
+                )
+            ],
         ),
         page.Section(
             "Number of hidden neurons",

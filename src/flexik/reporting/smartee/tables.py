@@ -1,32 +1,21 @@
 """Tables of the SmartEE's report."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from flexik.datasets.smartee.poses import path_name
-from flexik.evaluation.smartee.errors import OUTSIDE
-from flexik.learning.starts import by_trainer
-from flexik.mechanisms.smartee_newton import CONVERGED, NOT_CONVERGED, OTHER_BRANCH, SINGULAR
+from flexik.evaluation.smartee.errors import CORNERS, OUTSIDE
+from flexik.mechanisms.smartee_newton import CONVERGED
 from flexik.parameters.smartee import BEST, CENTRE, PREVIOUS, PUBLISHED, RANDOM, VALIDATION
-from flexik.reporting.smartee import notes
-from flexik.reporting.smartee.results import QUANTITIES, Results
+from flexik.reporting.smartee import notes, start_study
+from flexik.reporting.smartee.draws import draw_notes, draws
+from flexik.reporting.smartee.results import QUANTITIES, RIGHT, Results, right, scientific
 from flexik.reporting.tables import write_table
 
-# What is smaller is rounding, rad
-ROUNDING = 1e-12
-# Elbows farther than this from the right ones, after Newton steps, belong to another pose, rad
-RIGHT = 1e-6
 MRAD = 1e3
 N_STRETCHES = 5
-STATUS_NAMES = {
-    CONVERGED: "converged",
-    NOT_CONVERGED: "not converged",
-    SINGULAR: "singular",
-    OTHER_BRANCH: "other branch",
-}
 SINGLE, BATCHED = "single (us)", "batched (us)"
 
 
@@ -37,29 +26,62 @@ def write_tables(results: Results, folder: Path) -> None:
         peaks(results),
         4,
         f"Peak errors over the {len(results.of(PUBLISHED, 0, VALIDATION))} validation poses beside "
-        "the published ones, and over the random poses.",
+        "the published ones, over the random poses and over the corners of the box.",
         notes.peak_notes(results),
+    )
+    write_table(
+        folder / "draws",
+        draws(results),
+        {"meets (%)": 1, "5 %": 4, "median": 4, "95 %": 4, "goal": 4},
+        f"Peaks of {results.smartee.draws.n_draws} draws of as many poses as the validation has, "
+        "from the random poses: how much a peak hangs on which poses are drawn.",
+        draw_notes(results),
+    )
+    write_table(
+        folder / "other_geometries",
+        other_geometries(results),
+        {"reached (%)": 2, "median condition": 2, "largest condition": 2},
+        "Closure equations of other dimensions over the same box, for those that were not "
+        "published.",
+        notes.geometry_notes(results),
     )
     write_table(
         folder / "direct_kinematics",
         direct_kinematics(results),
-        {SINGLE: 1, BATCHED: 3},
+        {SINGLE: 0, BATCHED: 1},
         "Peak elbow error (rad) of every way to the elbows, and what a pose costs.",
         notes.direct_notes(results),
     )
     write_table(
         folder / "starts",
-        starts(results),
+        start_study.starts(results),
         {"success (%)": 1, "median elbow peak (mrad)": 2, "seconds a run": 2},
         f"Trainers from {results.smartee.starts.n_starts} starts each, near the origin and far "
         "from it.",
-        notes.start_notes(results),
+        start_study.start_notes(results),
+    )
+    write_table(
+        folder / "thresholds",
+        start_study.thresholds(results),
+        1,
+        "Share of the same runs that end at or below other errors.",
+        start_study.threshold_notes(results),
+    )
+    chosen = results.smartee.starts.sensitivity
+    write_table(
+        folder / "sensitivity",
+        start_study.sensitivity(results),
+        1,
+        f"`{chosen.trainer}` with other p and tau, from the first {chosen.n_starts} starts "
+        f"{chosen.spread}.",
+        start_study.sensitivity_notes(results),
     )
     write_table(
         folder / "sizes",
         sizes(results),
         6,
         "Error against the number of hidden neurons M (root mean squares of normalised outputs).",
+        notes.size_notes(results),
     )
     write_table(
         folder / "outside",
@@ -68,31 +90,72 @@ def write_tables(results: Results, folder: Path) -> None:
         "Errors inside the box (extent up to 1) and beyond it.",
         notes.outside_notes(results),
     )
-    write_table(folder / "newton", newton(results), 2, "Newton's method from the centre.")
+    write_table(
+        folder / "newton",
+        newton(results),
+        2,
+        "Newton's method from the centre.",
+        notes.newton_notes(results),
+    )
     write_table(
         folder / "training",
         results.training.drop(columns="trainer"),
         6,
         "Restarts of the networks (root mean squares of normalised outputs).",
+        notes.training_notes(results),
     )
 
 
 def peaks(results: Results) -> pd.DataFrame:
     """A row for every quantity: the published peak, and those and means of the networks."""
+    columns = [(name, name, column) for name, column in QUANTITIES.items()]
+    # what the printed orientation error is without the length of n x s
+    columns.append(("orientation, unit vectors", "orientation", "angle_error"))
     rows = []
-    for quantity, column in QUANTITIES.items():
+    for label, quantity, column in columns:
         unit, factor = results.shown(quantity)
         row: dict[str, object] = {
-            "error": f"{quantity} ({unit})",
+            "error": f"{label} ({unit})",
             "published": factor * results.published_peak(quantity),
         }
         for name in results.smartee.networks:
-            row[name] = factor * results.peak(name, 0, VALIDATION, quantity)
-            mean = results.of(name, 0, VALIDATION)[column].mean()
-            row[f"{name} mean"] = factor * results.factor(quantity) * mean
-            row[f"{name} random"] = factor * results.peak(name, 0, RANDOM, quantity)
+            found = {
+                poses: factor * results.factor(quantity) * results.of(name, 0, poses)[column]
+                for poses in (VALIDATION, RANDOM, CORNERS)
+            }
+            row[name] = found[VALIDATION].max()
+            row[f"{name} mean"] = found[VALIDATION].mean()
+            row[f"{name} random"] = found[RANDOM].max()
+            row[f"{name} corners"] = found[CORNERS].max()
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def other_geometries(results: Results) -> pd.DataFrame:
+    """A row for the assumed dimensions, and for each of the others."""
+    smartee = results.smartee
+    own = results.condition_numbers()
+    dimensions = (
+        *(smartee.geometry.base_radius, smartee.geometry.plate_radius),
+        smartee.workspace.centre[2],
+    )
+    found = {"assumed here": (dimensions, 1.0, own)}
+    for name, other in smartee.other_geometries.items():
+        dimensions = (other.base_radius, other.plate_radius, other.height)
+        found[name] = (dimensions, *results.conditions_of(other))
+    return pd.DataFrame(
+        {
+            "dimensions": name,
+            **{
+                f"{what} (mm)": f"{1e3 * value:g}"
+                for what, value in zip(("base", "plate", "height"), lengths, strict=True)
+            },
+            "reached (%)": 100.0 * share,
+            "median condition": float(np.median(numbers)) if len(numbers) else np.nan,
+            "largest condition": float(numbers.max()) if len(numbers) else np.nan,
+        }
+        for name, (lengths, share, numbers) in found.items()
+    )
 
 
 def direct_kinematics(results: Results) -> pd.DataFrame:
@@ -136,43 +199,19 @@ def _times(results: Results, method: str, n_steps: int) -> dict[str, float]:
     }
 
 
-def starts(results: Results) -> pd.DataFrame:
-    """A row for every trainer and spread, with the times of the benchmark."""
-    table = by_trainer(results.starts)
-    times = results.training_times.set_index(["trainer", "spread"])
-    reasons = results.starts.groupby(["trainer", "spread"])["stop_reason"].agg(_counted)
-    rows = []
-    for row in table.to_dict("records"):
-        key = row["trainer"], row["spread"]
-        time = times.loc[key] if key in times.index else pd.Series(dtype=float)
-        rows.append(
-            {
-                "trainer": row["trainer"],
-                "start": row["spread"],
-                "success (%)": 100.0 * float(row["success_share"]),
-                "least error": scientific(row["least_error"]),
-                "median error": scientific(row["median_error"]),
-                "largest error": scientific(row["largest_error"]),
-                "median elbow peak (mrad)": MRAD * float(row["median_judged"]),
-                "iterations": str(results.smartee.trainers[str(row["trainer"])].n_iterations),
-                "to success": _whole(float(row["median_success_iteration"])),
-                "ended by": reasons[key],
-                "seconds a run": float(time.get("seconds", np.nan)),
-                "median error of long runs": scientific(float(time.get("long_error", np.nan))),
-            }
-        )
-    return pd.DataFrame(rows)
-
-
 def sizes(results: Results) -> pd.DataFrame:
-    """A row for every size."""
+    """A row for every size: of the two sets of rows to learn from."""
+    own = results.smartee.sizes
     names = {
-        "n_hidden": "M",
         "training_error": "training",
         "selection_error": "selection, best start",
         "worst_selection_error": "selection, worst start",
     }
-    return results.sizes[list(names)].rename(columns=names)
+    parts = []
+    for poses, table in ((own.poses, results.sizes), (own.beside, results.sizes_beside)):
+        labels = {column: f"{poses}: {label}" for column, label in names.items()}
+        parts.append(table.set_index("n_hidden")[list(names)].rename(columns=labels))
+    return pd.concat(parts, axis=1).rename_axis("M").reset_index()
 
 
 def outside(results: Results) -> pd.DataFrame:
@@ -187,11 +226,11 @@ def outside(results: Results) -> pd.DataFrame:
             errors = MRAD * _within(results.of(name, 0, OUTSIDE), low, high)["elbow_error"]
             row[f"{name} median (mrad)"] = float(errors.median())
             row[f"{name} peak (mrad)"] = float(errors.max())
-            after = _within(results.of(name, steps, OUTSIDE), low, high)["elbow_error"]
-            row[f"{name} + {steps} steps right (%)"] = 100.0 * float((after <= RIGHT).mean())
+            after = _within(results.of(name, steps, OUTSIDE), low, high)
+            share = float((after["elbow_error"] <= RIGHT).mean())
+            row[f"{name} + {steps} steps right (%)"] = 100.0 * share
         part = _within(newton, low, high)
-        found = (part["status"] == CONVERGED) & (part["elbow_error"] <= RIGHT)
-        row["Newton from the centre right (%)"] = 100.0 * float(found.mean())
+        row["Newton from the centre right (%)"] = 100.0 * float(right(part).mean())
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -201,31 +240,16 @@ def newton(results: Results) -> pd.DataFrame:
     rows = []
     for poses, group in results.newton.groupby("poses", sort=False):
         row: dict[str, object] = {"poses": str(poses), "number": len(group)}
-        for status, name in STATUS_NAMES.items():
+        for status, name in notes.STATUS_NAMES.items():
             row[name] = int((group["status"] == status).sum())
         found = group[group["status"] == CONVERGED]
-        row["to wrong elbows"] = int((found["elbow_error"] > RIGHT).sum())
+        row["to wrong elbows"] = int((~right(found)).sum())
         row["mean steps"] = float(found["n_steps"].mean())
-        row["most steps"] = int(found["n_steps"].max())
+        row["most steps"] = int(found["n_steps"].max()) if len(found) else 0
+        row["largest residual"] = scientific(float(found["residual"].max()))
         rows.append(row)
     return pd.DataFrame(rows)
 
 
-def scientific(value: float) -> str:
-    """Three digits; what is below ROUNDING is not told apart, NaN is empty."""
-    if np.isnan(value):
-        return ""
-    return f"{value:.2e}" if value >= ROUNDING else f"< {ROUNDING:.0e}"
-
-
 def _within(table: pd.DataFrame, low: float, high: float) -> pd.DataFrame:
     return table[(table["extent"] > low) & (table["extent"] <= high)]
-
-
-def _whole(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.0f}"
-
-
-def _counted(reasons: Sequence[str]) -> str:
-    counts = pd.Series(reasons).value_counts()
-    return ", ".join(f"{reason}: {count}" for reason, count in sorted(counts.items()))
