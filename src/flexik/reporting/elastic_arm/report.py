@@ -14,7 +14,12 @@ from flexik.parameters import BackPropagation, parameters_checksum
 from flexik.reporting import page
 from flexik.reporting.elastic_arm import figures
 from flexik.reporting.elastic_arm.results import Results
-from flexik.reporting.elastic_arm.sensitivity import NOTHING, mean_errors, sensitivity_text
+from flexik.reporting.elastic_arm.sensitivity import (
+    NOISE,
+    NOTHING,
+    mean_errors,
+    sensitivity_text,
+)
 from flexik.reporting.elastic_arm.tables import layers_name, write_tables
 from flexik.reporting.style import MM
 
@@ -68,7 +73,8 @@ def metrics(results: Results) -> dict[str, float]:
 
 def write_figures(results: Results, folder: Path) -> None:
     """Write all figures into `folder`."""
-    theta_1 = float(degree_axis(results.arm.readings.theta_1_degrees)[0])
+    # steepest: at 0 no force acts along link 1
+    theta_1 = float(degree_axis(results.arm.readings.theta_1_degrees)[-1])
     for link in (1, 2):
         path = folder / f"deformation_link_{link}.png"
         shown = results.shown[FREE_OF_NOISE], results.shown[NOISY]
@@ -117,7 +123,7 @@ def hidden_methods(results: Results) -> list[str]:
 def write_page(results: Results, folder: Path, inputs: Mapping[str, str]) -> None:
     """Write README.md of `folder` from the tables and figures there."""
     arm, drawn = results.arm, folder / "figures"
-    theta_1 = arm.readings.theta_1_degrees.minimum
+    theta_1 = arm.readings.theta_1_degrees.maximum
     sections = [
         page.Section(
             "What the gauges tell",
@@ -203,14 +209,13 @@ def _positioning_text(results: Results) -> str:
         network = arm.all_networks[method.network]
         hidden = f"{layers_name(results.layers[method.network])}, {network.trainer}"
         if method.method == "gauges":
-            shown = (network.readings or "").replace("_", "-")
             told = {
                 "gauges_without_dx": "the target and the deformation but dx",
                 "gauges_elbow": "target, elbow and the deformation",
             }.get(network.kind, "the target and the deformation")
             text = (
-                f"network `{method.network}` ({hidden}) of {told} that "
-                f"{shown} gauges show in the very pose it should find. No controller knows that "
+                f"network `{method.network}` ({hidden}) of {told} that gauges "
+                f"({NOISE[network.readings or FREE_OF_NOISE]}) show in the very pose it should find. No controller knows that "
                 "before the arm is there."
             )
         elif method.method == "inverse":
@@ -239,9 +244,9 @@ def _fit_text(results: Results) -> str:
         f"gauges and the tip by equations 44 and "
         "45 from them, as in the paper, less or more where the column of gauges says so; R is the "
         f"correlation of network and target. {border} of the {held_out} held-out readings lie on "
-        "the border of the grid of angles and are extrapolated to where no reading beyond them "
-        "trains; all have payloads of the readings, while the random targets lie between those. R "
-        "is also that at the random targets, of the commanded angles."
+        "the border of the grid of angles, so that no reading beyond them trains. All have payloads "
+        "of the readings, while those of the random targets lie between. R at the random targets is "
+        "that of the commanded angles."
     )
 
 

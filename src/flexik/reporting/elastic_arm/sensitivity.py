@@ -10,6 +10,11 @@ from flexik.reporting.style import MM
 
 MICRO = 1e6
 NOTHING = "nothing"
+NOISE = {
+    gauges.FREE_OF_NOISE: "without noise",
+    gauges.NOISY: "with noise",
+    gauges.NOISY_VOLTAGES: "with noise in the voltages alone",
+}
 
 
 def shown_rows(results: Results) -> list[str]:
@@ -72,9 +77,9 @@ def sensitivity_text(results: Results) -> str:
                 "gauges_without_dx": "without dx",
                 "gauges_elbow": "with the elbow too",
             }.get(network.kind, "with dx")
-            noise = (network.readings or "").replace("_", " ")
+            noise = NOISE[network.readings or FREE_OF_NOISE]
             lines.append(
-                f"- `{other}` ({noise} gauges, {given}): held-out R {fit.r[0]:.6f} and "
+                f"- `{other}` (gauges {noise}, {given}): held-out R {fit.r[0]:.6f} and "
                 f"{fit.r[1]:.6f}, mean tip error {MM * fit.mean_error:.2f} mm."
             )
     head = "Networks of the same size and trainer, each trained with its own inputs:\n\n"

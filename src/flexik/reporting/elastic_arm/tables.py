@@ -262,7 +262,7 @@ def write_tables(results: Results, folder: Path) -> None:
     tables.write_table(
         folder / "fit",
         fit,
-        {name: 8 if "held" in name else 6 for name in fit.columns if name.startswith("R ")},
+        {name: 6 if "published" in name else 8 for name in fit.columns if name.startswith("R ")},
         "Networks given gauges: correlation R of network and target, and how far the flexible "
         "model's tip at the network's angles is from its tip in the held-out reading.",
         fit_notes(results),
