@@ -2,8 +2,8 @@
 
 Reads params.yaml: elastic_arm.geometry, elastic_arm.structure, elastic_arm.gauges,
 elastic_arm.readings.
-Writes data/elastic_arm/readings.parquet, what the model has, and gauges_noise_free.parquet and
-gauges_noisy.parquet, what the gauges show.
+Writes data/elastic_arm/readings.parquet, what the model has, and what the gauges show:
+gauges_noise_free.parquet, gauges_noisy.parquet and gauges_noisy_voltages.parquet (strains exact).
 """
 
 from pathlib import Path
@@ -41,9 +41,9 @@ def main() -> None:
     part = divide(len(payload), readings.selection_share, readings.held_out_share, readings.seed)
     columns = columns_of([angles, payload, part, forward(model.geometry, angles), *found], FIELDS)
     write_table(FOLDER / "readings.parquet", columns, FIELDS, made_with)
-    for shown in (gauges.FREE_OF_NOISE, gauges.NOISY):
+    for shown in gauges.SHOWN:
         read = gauges.read(
-            gauges_of(arm), *found[1:], noise_generator(arm, shown, STREAM_OF_READINGS)
+            gauges_of(arm, shown), *found[1:], noise_generator(arm, shown, STREAM_OF_READINGS)
         )
         tip = flexible_forward(model.geometry, angles, read.deformation)
         write_table(

@@ -3,7 +3,7 @@
 Reads params.yaml: elastic_arm.geometry, elastic_arm.structure, elastic_arm.gauges,
 elastic_arm.readings, elastic_arm.workspace.
 Writes data/elastic_arm/targets.parquet: targets, payloads, and angles that put the loaded tip on
-them.
+them; and targets.json, how many were drawn, reached and kept.
 """
 
 import functools
@@ -18,6 +18,7 @@ from flexik.datasets.elastic_arm.readings import columns_of, degree_axis
 from flexik.datasets.tables import write_table
 from flexik.errors import ParameterError
 from flexik.evaluation.targets import Targets, draw_candidates, reachable_targets
+from flexik.files import write_json
 from flexik.mechanisms.elastic_arm import forward
 from flexik.multibody.elastic_arm.assembly import flexible_arm
 from flexik.multibody.elastic_arm.model import FlexibleArm, solve
@@ -54,6 +55,8 @@ def main() -> None:
         TARGET_FIELDS,
         targets_checksum(arm),
     )
+    counts = {"drawn": n_drawn, "reached": n_found, "kept": wanted}
+    write_json(FOLDER / "targets.json", counts)
     print(f"{n_found} of {n_drawn} random targets are reached, {wanted} kept")
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from flexik import parameters, stage
 from flexik.datasets.elastic_arm.learning import KINDS, read_learning_data
 from flexik.datasets.elastic_arm.provenance import network_checksum
-from flexik.errors import ParameterError, TrainingError
+from flexik.errors import DataError, ParameterError, TrainingError
 from flexik.files import write_text
 from flexik.learning.perceptron import quantities
 from flexik.learning.records import restarts_csv
@@ -62,7 +62,11 @@ def size_of(
     """Neurons of every hidden layer, given or chosen."""
     if isinstance(network, parameters.ArmNetwork):
         return tuple(network.n_hidden)
-    return read_layers(DATA / "size_selection" / f"{name}.json")
+    path = DATA / "size_selection" / f"{name}.json"
+    chosen = read_layers(path)
+    if len(chosen) != len(network.select.n_hidden):
+        raise DataError(f"{path}: {len(chosen)} layers, expected {len(network.select.n_hidden)}")
+    return chosen
 
 
 if __name__ == "__main__":

@@ -109,6 +109,39 @@ def test_noise_and_resolution_are_those_of_params(few):
     assert np.abs(stepped * GAUGES.resolution - noisy.voltages).max() <= 0.51 * GAUGES.resolution
 
 
+def test_uncertainty_of_the_deformation_is_that_of_many_noisy_readings(few):
+    """So both gauges of a tip count, by the inverse squares of their slopes."""
+    *_, found = few
+    many = Equilibria(*(np.repeat(values, 4000, axis=0) for values in found))
+    # steps that the noise spreads over
+    settings = replace(GAUGES, resolution=1e-3, strain_resolution=1e-7)
+    apart = read(many, np.random.default_rng(1), settings).deformation - read(many).deformation
+    assert np.std(apart, axis=0) == pytest.approx(gauges.uncertainty(settings), rel=0.03)
+    volt = np.hypot(2e-3, 1e-3 / np.sqrt(12))
+    least = volt / np.sqrt(0.0026**-2 + 0.0010**-2)
+    assert gauges.uncertainty(settings)[0] == pytest.approx(least)
+    assert least < volt * 0.0010 < volt * np.hypot(0.0026, 0.0010) / 2
+
+
+def test_voltages_beyond_the_range_are_clipped_and_counted(few):
+    *_, found = few
+    exact = read(found).voltages
+    assert gauges.n_clipped(GAUGES, exact) == 0
+    narrow = replace(GAUGES, voltage_range=(-2.0, 2.0))
+    shown = read(found, np.random.default_rng(0), narrow).voltages
+    assert shown.min() == -2.0
+    assert gauges.n_clipped(narrow, exact) == int((np.abs(exact) >= 2.0).any(axis=1).sum()) > 0
+
+
+def test_noise_in_the_voltages_alone_leaves_the_strains_exact(few):
+    *_, found = few
+    settings = gauges_of(ARM, gauges.NOISY_VOLTAGES)
+    shown = read(found, noise_generator(ARM, gauges.NOISY_VOLTAGES, 0), settings)
+    assert np.array_equal(shown.strains, found.axial_strain)
+    assert not np.allclose(shown.voltages, read(found).voltages, atol=1e-5)
+    assert gauges_of(ARM, gauges.NOISY) == GAUGES
+
+
 def test_noise_is_drawn_for_noisy_readings_alone():
     assert noise_generator(ARM, "noise_free", 0) is None
     assert noise_generator(ARM, None, 0) is None
@@ -125,7 +158,7 @@ def tables(few, tmp_path):
     rigid = forward(GEOMETRY, angles)
     columns = columns_of([angles, payload, part, rigid, *found], FIELDS)
     write_table(tmp_path / "readings.parquet", columns, FIELDS, made_with)
-    for name in (gauges.FREE_OF_NOISE, gauges.NOISY):
+    for name in gauges.SHOWN:
         shown = read(found, noise_generator(ARM, name, 0))
         tip = flexible_forward(GEOMETRY, angles, shown.deformation)
         write_table(
@@ -151,6 +184,8 @@ def test_networks_never_see_held_out_readings(few, tables):
     assert np.array_equal(deflection.outputs, sag[[0, 3]])
     inverse = read_learning_data(tables, ARM, "inverse")
     assert inverse.selection_inputs.tolist() == [[*found.tip[1], 0.0, -1.0]]
+    without = read_learning_data(tables, ARM, "published_network_without_dx")
+    assert np.array_equal(without.inputs, np.delete(data.inputs, [1, 4], axis=1))
     noisy = read_learning_data(tables, ARM, "published_network_noisy")
     assert not np.array_equal(noisy.inputs, data.inputs)
 

@@ -101,6 +101,13 @@ def test_twice_as_many_elements_move_the_tip_by_under_two_micrometres():
     assert np.abs(found).max() < 2e-6
 
 
+def test_a_strain_station_at_the_end_takes_the_last_element():
+    load = (np.radians([[10.0, 20.0]]), np.array([1.0]))
+    at_end = equilibria(replace(MODEL, strain_stations=(0.5699, 0.6199)), *load).axial_strain
+    before = equilibria(replace(MODEL, strain_stations=(0.56, 0.61)), *load).axial_strain
+    assert at_end == pytest.approx(before, rel=0.05)
+
+
 def test_rows_do_not_depend_on_each_other():
     angles = np.radians([[0.0, 0.0], [20.0, -30.0], [10.0, 50.0]])
     payload = np.array([3.0, 0.0, 1.0])

@@ -15,6 +15,10 @@ WRONG = [
     ("structure.tube.wall", 0.01),
     ("structure.gravity", 0.0),
     ("structure.n_elements", 0),
+    ("structure.n_elements", 1000000),
+    ("structure.youngs_modulus", 1.0e6),
+    ("structure.youngs_modulus", 1.0e30),
+    ("gauges.voltage_range", [5.0, -5.0]),
     ("gauges.slopes.1", [0.0016, 0.0, 0.0022]),
     ("gauges.deflection_stations.0", 0.6),
     ("gauges.strain_stations.1", 0.62),
@@ -23,6 +27,15 @@ WRONG = [
     ("readings.theta_1_degrees.maximum", 40.0),
     ("readings.payloads", [0.0, 1.0, 1.0]),
     ("readings.payloads", []),
+    ("readings.payloads", [0.0, 1.0e4]),
+    ("readings.held_out_share", 0.0001),
+    ("readings.selection_share", 0.8499),
+    ("readings.theta_1_degrees.increment", 1.0e-6),
+    ("splits.seeds", [2, 2]),
+    ("splits.seeds", [1]),
+    ("splits.network", "deflection"),
+    ("workspace.payload", [0.0, 10.0]),
+    ("workspace.payload_error", 0.0),
     ("readings.held_out_share", 0.85),
     ("readings.selection_share", 0.0),
     ("networks.published_network.readings", None),
@@ -37,6 +50,7 @@ WRONG = [
     ("methods.combined.network", "inverse"),
     ("methods.combined.network", "nothing"),
     ("methods.combined.n_corrections", 0),
+    ("methods.combined.network", "gauges_elbow_lm_noisy"),
     ("methods.inverse_network.network", "published_network"),
     ("methods.published_network.network", "published_network_lm"),
     ("methods.published_network.method", "oracle"),
@@ -84,7 +98,8 @@ def test_a_network_given_gauges_is_needed():
     data = changed("networks", {k: networks[k] for k in ("deflection", "inverse")})
     data["elastic_arm"]["selected_networks"] = {}
     data["elastic_arm"]["methods"] = {}
-    assert "networks: expected a network of kind gauges" in mistake(data)
+    text = mistake(data)
+    assert "splits.network" in text and "of kind gauges, the published idea" in text
 
 
 def test_angles_are_in_degrees_and_radians_inside():

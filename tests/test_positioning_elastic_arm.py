@@ -1,17 +1,20 @@
 """Methods of the elastic arm, with exact functions in place of networks."""
 
+import importlib.util
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from elastic_arm import ARM, GEOMETRY, MODEL
+from elastic_arm import ARM, GEOMETRY, MODEL, ROOT
 
+from flexik.datasets.elastic_arm.gauges import read, uncertainty
+from flexik.datasets.elastic_arm.readings import gauges_of
 from flexik.errors import DataError
 from flexik.evaluation.conditions import random_conditions
 from flexik.evaluation.errors import evaluate
 from flexik.evaluation.regression import correlation
 from flexik.evaluation.targets import reachable_targets
-from flexik.mechanisms.elastic_arm import elbow, forward, inverse_by_rule
+from flexik.mechanisms.elastic_arm import DEFORMATION, elbow, forward, inverse_by_rule
 from flexik.mechanisms.status import OUT_OF_REACH, REACHED
 from flexik.multibody.elastic_arm.model import equilibria, solve
 from flexik.positioning.elastic_arm.assembly import arm_method, uncompensated
@@ -96,6 +99,9 @@ def test_inverse_network_is_asked_for_target_payload_and_elbow():
     assert command.diagnostics["n_clipped"].tolist() == [2, 2, 2, 2, 0]
 
 
+EIGHT = (*DEFORMATION, "p_x", "p_y")
+
+
 def test_gauge_network_is_told_the_deformation_beside_the_target():
     deformation = np.arange(24.0).reshape(4, 6)
 
@@ -103,10 +109,57 @@ def test_gauge_network_is_told_the_deformation_beside_the_target():
         assert np.array_equal(inputs, np.hstack([deformation, TARGETS]))
         return 0.1 * np.ones((4, 2))
 
-    command = GaugeNetwork(GEOMETRY, predicting(predict), deformation)(TARGETS, PAYLOAD, HOME)
+    method = GaugeNetwork(GEOMETRY, predicting(predict), EIGHT, deformation)
+    command = method(TARGETS, PAYLOAD, HOME)
     assert (command.strokes == 0.1).all() and (command.status == REACHED).all()
     with pytest.raises(PositioningError, match="deformation by the gauges"):
-        GaugeNetwork(GEOMETRY, predicting(predict), deformation)(TARGETS[:2], PAYLOAD[:2], HOME[:2])
+        method(TARGETS[:2], PAYLOAD[:2], HOME[:2])
+
+
+def test_gauge_networks_of_other_kinds_are_told_their_inputs():
+    deformation, asked = np.arange(24.0).reshape(4, 6), []
+
+    def predict(inputs):
+        asked.append(inputs)
+        return np.full((4, 2), 9.0)
+
+    network = predicting(predict)
+    for label, kind in (
+        ("published_network_without_dx", "gauges_without_dx"),
+        ("gauges_elbow_lm_noisy", "gauges_elbow"),
+    ):
+        method = arm_method(ARM.methods[label], GEOMETRY, network, deformation, kind)
+        command = method(TARGETS, PAYLOAD, HOME)
+        assert command.diagnostics["n_clipped"].tolist() == [2] * 4
+    side = elbow(inverse_by_rule(GEOMETRY, TARGETS).angles)
+    assert np.array_equal(asked[0], np.hstack([deformation[:, [0, 2, 3, 5]], TARGETS]))
+    assert np.array_equal(asked[1], np.column_stack([deformation, TARGETS, side]))
+
+
+def test_noisy_gauges_are_noisy_at_the_targets_too(monkeypatch):
+    """The stage's own choice of what a method is told."""
+    path = ROOT / "stages" / "elastic_arm_evaluate.py"
+    spec = importlib.util.spec_from_file_location("elastic_arm_evaluate", path)
+    stage = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(stage)
+    monkeypatch.setattr(stage, "trained", lambda arm, name: predicting(None))
+    angles = inverse_by_rule(GEOMETRY, TARGETS).angles
+    found = equilibria(MODEL, angles, PAYLOAD)
+    told = {
+        label: stage.chosen_method(ARM, label, MODEL, found).deformation
+        for label, method in ARM.methods.items()
+        if method.method == "gauges"
+    }
+    exact = read(gauges_of(ARM), *found[1:], None).deformation
+    uncertain = uncertainty(gauges_of(ARM))
+    for label, deformation in told.items():
+        off = np.abs(deformation - exact)
+        network = ARM.all_networks[ARM.methods[label].network]
+        if network.readings == "noise_free":
+            assert np.array_equal(deformation, exact)
+        else:
+            assert (off[:, [0, 2, 3, 5]] > 0.0).all() and (off < 6 * uncertain).all()
+            assert (off[:, [1, 4]] > 0.0).all() == (network.readings == "noisy")
 
 
 def test_a_gauge_method_without_gauges_is_refused():

@@ -19,12 +19,19 @@ from flexik.parameters.trainers import Trainer
 
 Pair = tuple[Positive, Positive]
 Triple = tuple[float, float, float]
+# From wood to diamond, Pa; and what a link of half a metre could carry, kg
+Stiffness = Annotated[float, Field(ge=1e10, le=1.2e12)]
+Payload = Annotated[float, Field(ge=0, le=100)]
 # Below a straight angle either way
 Degrees = Annotated[float, Field(gt=-180, lt=180)]
 Share = Annotated[float, Field(gt=0, lt=1)]
 
 # Prefixes of metrics and files that are no network or method, and names DVC's run cache ignores
-TAKEN_NAMES = ("none", "readings", "gauges", "select", "size", "nfiles")
+TAKEN_NAMES = ("none", "readings", "gauges", "select", "size", "nfiles", "splits")
+
+MAXIMUM_READINGS = 20_000
+# Fewest readings of a part: an R needs several
+MINIMUM_PART = 5
 
 
 class Geometry(Model):
@@ -58,11 +65,11 @@ class Structure(Model):
     """What bends and weighs, see multibody.elastic_arm.FlexibleArm."""
 
     tube: Tube
-    youngs_modulus: Positive
+    youngs_modulus: Stiffness
     density: Positive
     joint_mass: NotNegative
     gravity: Positive
-    n_elements: Count
+    n_elements: Annotated[int, Field(ge=1, le=200)]
 
 
 class Gauges(Model):
@@ -73,6 +80,7 @@ class Gauges(Model):
     slopes: tuple[Triple, Triple]
     intercepts: tuple[Triple, Triple]
     noise: NotNegative
+    voltage_range: Interval
     resolution: NotNegative
     strain_noise: NotNegative
     strain_resolution: NotNegative
@@ -80,6 +88,7 @@ class Gauges(Model):
 
     @model_validator(mode="after")
     def _sloping(self) -> Self:
+        check_increase(self, "voltage_range")
         for number, slopes in enumerate(self.slopes):
             if 0.0 in slopes:
                 raise ValueError(f"slopes.{number}: a gauge of slope zero tells no deflection")
@@ -100,13 +109,18 @@ class DegreeAxis(Model):
             raise ValueError("increment: maximum - minimum must be a whole number of increments")
         return self
 
+    @property
+    def n_angles(self) -> int:
+        """Number of angles."""
+        return round((self.maximum - self.minimum) / self.increment) + 1
+
 
 class Readings(Model):
     """Poses and payloads of the experiment, and how they are divided."""
 
     theta_1_degrees: DegreeAxis
     theta_2_degrees: DegreeAxis
-    payloads: Annotated[list[NotNegative], Field(min_length=1)]
+    payloads: Annotated[list[Payload], Field(min_length=1)]
     selection_share: Share
     held_out_share: Share
     seed: Seed
@@ -117,19 +131,60 @@ class Readings(Model):
             raise ValueError("held_out_share: leaves no reading to train with")
         if len(set(self.payloads)) < len(self.payloads):
             raise ValueError("payloads: one is there twice")
+        for name in ("theta_1_degrees", "theta_2_degrees"):
+            if (n := getattr(self, name).n_angles) > MAXIMUM_READINGS:
+                raise ValueError(f"{name}.increment: {n} angles, at most {MAXIMUM_READINGS}")
+        if self.n_readings > MAXIMUM_READINGS:
+            raise ValueError(
+                f"theta_1_degrees.increment, theta_2_degrees.increment: {self.n_readings} "
+                f"readings, at most {MAXIMUM_READINGS}"
+            )
+        n, least = self.n_readings, MINIMUM_PART
+        held_out, selection = round(self.held_out_share * n), round(self.selection_share * n)
+        for key, part in (("held_out_share", held_out), ("selection_share", selection)):
+            if part < least:
+                raise ValueError(f"{key}: {part} of {n} readings, expected {least} or more")
+        if n - held_out - selection < least:
+            raise ValueError(
+                f"selection_share, held_out_share: leave {n - held_out - selection} of {n} "
+                f"readings to train with, expected {least} or more"
+            )
+        return self
+
+    @property
+    def n_readings(self) -> int:
+        """Number of readings: every pair of angles with every payload."""
+        return self.theta_1_degrees.n_angles * self.theta_2_degrees.n_angles * len(self.payloads)
+
+
+class Splits(Model):
+    """Other divisions of the readings, by which one network is trained and judged again."""
+
+    network: Name
+    seeds: Annotated[list[Seed], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _once(self) -> Self:
+        if len(set(self.seeds)) < len(self.seeds):
+            raise ValueError("seeds: one is there twice")
         return self
 
 
 class _Kind(Learner):
     """What is learnt, and from which gauges."""
 
-    kind: Literal["gauges", "deflection", "inverse"]
-    readings: Literal["noise_free", "noisy"] | None
+    kind: Literal["gauges", "gauges_without_dx", "gauges_elbow", "deflection", "inverse"]
+    readings: Literal["noise_free", "noisy", "noisy_voltages"] | None
+
+    @property
+    def has_gauges(self) -> bool:
+        """Whether it is given gauges."""
+        return self.kind.startswith("gauges")
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
-        if (self.kind == "gauges") != (self.readings is not None):
-            raise ValueError("readings: of kind gauges, null for the other kinds")
+        if self.has_gauges != (self.readings is not None):
+            raise ValueError("readings: of the kinds with gauges, null for the other kinds")
         return self
 
 
@@ -160,7 +215,8 @@ class Workspace(Model):
     n_targets: Count
     x: Interval
     y: Interval
-    payload: tuple[NotNegative, NotNegative]
+    payload: tuple[Payload, Payload]
+    payload_error: Positive
     tolerance: Positive
     n_iterations: Count
     seed: Seed
@@ -194,7 +250,11 @@ class CombinedMethod(Model):
 
 
 ArmMethod = Annotated[GaugeMethod | InverseMethod | CombinedMethod, Field(discriminator="method")]
-NETWORK_KIND = {"gauges": "gauges", "inverse": "inverse", "combined": "deflection"}
+NETWORK_KINDS = {
+    "gauges": ("gauges", "gauges_without_dx", "gauges_elbow"),
+    "inverse": ("inverse",),
+    "combined": ("deflection",),
+}
 
 
 class ElasticArm(Model):
@@ -204,6 +264,7 @@ class ElasticArm(Model):
     structure: Structure
     gauges: Gauges
     readings: Readings
+    splits: Splits
     trainers: dict[Name, Trainer]
     networks: dict[Name, ArmNetwork]
     selected_networks: dict[Name, SelectedArmNetwork]
@@ -214,6 +275,11 @@ class ElasticArm(Model):
     def all_networks(self) -> dict[str, ArmNetwork | SelectedArmNetwork]:
         """Networks of both sections by name."""
         return {**self.networks, **self.selected_networks}
+
+    @property
+    def gauge_networks(self) -> list[str]:
+        """Names of the networks given gauges."""
+        return [name for name, network in self.all_networks.items() if network.has_gauges]
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -233,6 +299,11 @@ class ElasticArm(Model):
             axis, (low, high) = getattr(self.readings, name), getattr(self.geometry, name)
             if axis.minimum < low or axis.maximum > high:
                 raise ValueError(f"readings.{name}: beyond the joint, {low} to {high}")
+        least, most = min(self.readings.payloads), max(self.readings.payloads)
+        if self.workspace.payload[0] < least or self.workspace.payload[1] > most:
+            raise ValueError(
+                f"workspace.payload: beyond the payloads of the readings, {least:g} to {most:g} kg"
+            )
 
     def _check_networks(self) -> None:
         trainers = {f"networks.{name}": n.trainer for name, n in self.networks.items()}
@@ -246,8 +317,14 @@ class ElasticArm(Model):
                 raise ValueError(
                     f"{key}.trainer: there is no trainer {trainer!r} ({', '.join(self.trainers)})"
                 )
-        if all(network.kind != "gauges" for network in self.all_networks.values()):
-            raise ValueError("networks: expected a network of kind gauges, the published idea")
+        split = self.networks.get(self.splits.network)
+        if split is None or split.kind != "gauges":
+            raise ValueError(
+                f"splits.network: {self.splits.network!r}, expected a name under networks of kind "
+                "gauges, the published idea"
+            )
+        if self.readings.seed in self.splits.seeds:
+            raise ValueError("splits.seeds: holds readings.seed, the main division")
         for section in ("networks", "selected_networks", "methods"):
             for name in getattr(self, section):
                 if name in TAKEN_NAMES:
@@ -261,11 +338,11 @@ class ElasticArm(Model):
                     f"methods.{label}.network: there is no network {method.network!r} "
                     f"({', '.join(networks)})"
                 )
-            needed, kind = NETWORK_KIND[method.method], networks[method.network].kind
-            if kind != needed:
+            needed, kind = NETWORK_KINDS[method.method], networks[method.network].kind
+            if kind not in needed:
                 raise ValueError(
                     f"methods.{label}.network: {method.network!r} is of kind {kind}, "
-                    f"{method.method} needs {needed}"
+                    f"{method.method} needs {' or '.join(needed)}"
                 )
             if label in networks and method.network != label:
                 raise ValueError(f"methods.{label}: the name of another network than its own")

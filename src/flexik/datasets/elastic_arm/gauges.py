@@ -5,6 +5,10 @@ straight calibration lines (Al-Khafaji and Jweeg 2017, equations 48 to 53). The 
 is that of the line through the deflections of station and tip (equation 47), less than the slope of
 a bent link at its tip. The elongation is the axial strain of a pair of gauges times the length
 (equation 54); it knows nothing of the way by which a bent link becomes shorter.
+
+Both gauges of the tip tell the same deflection, but the one of the steeper line spoils it more by
+the same noise of its voltage. Their mean is weighted by the inverse squares of the slopes, as least
+squares does.
 """
 
 from dataclasses import dataclass
@@ -17,7 +21,9 @@ from flexik.datasets.tables import Field
 
 Array = NDArray[np.float64]
 
-FREE_OF_NOISE, NOISY = "noise_free", "noisy"
+# Without noise, with noise in all, and with noise in the voltages alone (strains exact)
+FREE_OF_NOISE, NOISY, NOISY_VOLTAGES = "noise_free", "noisy", "noisy_voltages"
+SHOWN = (FREE_OF_NOISE, NOISY, NOISY_VOLTAGES)
 
 
 @dataclass(frozen=True)
@@ -27,6 +33,7 @@ class Gauges:
     lengths, stations : of the links, and of gauge 3 from the joints, m.
     slopes, intercepts : calibration lines, m/V and m, by link those of gauges 1 to 3.
     noise, resolution : standard deviation and step of a voltage, V.
+    voltage_range : least and largest voltage that is measured, V; what is beyond is clipped.
     strain_noise, strain_resolution : the same of an axial strain.
     """
 
@@ -35,6 +42,7 @@ class Gauges:
     slopes: tuple[tuple[float, float, float], tuple[float, float, float]]
     intercepts: tuple[tuple[float, float, float], tuple[float, float, float]]
     noise: float
+    voltage_range: tuple[float, float]
     resolution: float
     strain_noise: float
     strain_resolution: float
@@ -84,7 +92,7 @@ def read(
     """What `gauges` show of links with `deformation` (n, 6) in m and rad.
 
     `station_deflection` (n, 2) in m and `axial_strain` (n, 2) are those at the gauges. `generator`
-    draws the noise; without it there is neither noise nor resolution.
+    draws the noise; without it there is neither noise nor resolution nor an end of the range.
     """
     tip = deformation[:, [0, 3]]
     slopes, intercepts = np.array(gauges.slopes), np.array(gauges.intercepts)
@@ -92,9 +100,39 @@ def read(
     voltages = ((deflection - intercepts) / slopes).reshape(-1, 6)
     strains = axial_strain
     if generator is not None:
-        voltages = _measured(voltages, gauges.noise, gauges.resolution, generator)
+        voltages = np.clip(
+            _measured(voltages, gauges.noise, gauges.resolution, generator), *gauges.voltage_range
+        )
         strains = _measured(strains, gauges.strain_noise, gauges.strain_resolution, generator)
     return GaugeReadings(voltages, strains, _deformation(gauges, voltages, strains))
+
+
+def uncertainty(gauges: Gauges) -> Array:
+    """Standard uncertainty (6,) of each deformation variable in m and rad, by noise and resolution.
+
+    A step s adds the standard deviation s / sqrt(12) of an error uniform within it.
+    """
+    volt = np.hypot(gauges.noise, gauges.resolution / np.sqrt(12.0))
+    strain = np.hypot(gauges.strain_noise, gauges.strain_resolution / np.sqrt(12.0))
+    found = []
+    for length, station, slopes in zip(
+        gauges.lengths, gauges.stations, np.array(gauges.slopes), strict=True
+    ):
+        dy = volt * np.linalg.norm(_weights(slopes[:2]) * slopes[:2])
+        found += [dy, length * strain, np.hypot(dy, volt * slopes[2]) / (length - station)]
+    return np.array(found)
+
+
+def n_clipped(gauges: Gauges, voltages: Array) -> int:
+    """Number of rows of `voltages` (n, 6) in V with one at an end of the range or beyond."""
+    low, high = gauges.voltage_range
+    return int(np.any((voltages <= low) | (voltages >= high), axis=1).sum())
+
+
+def _weights(slopes: Array) -> Array:
+    """Weights of gauges of `slopes` in their mean: inverse squares, of sum 1."""
+    inverse = 1.0 / slopes**2
+    return np.asarray(inverse / inverse.sum())
 
 
 def _deformation(gauges: Gauges, voltages: Array, strains: Array) -> Array:
@@ -103,8 +141,7 @@ def _deformation(gauges: Gauges, voltages: Array, strains: Array) -> Array:
     deflection = voltages.reshape(-1, 2, 3) * slopes + intercepts
     columns = []
     for link in (0, 1):
-        # two gauges tell the same
-        tip = deflection[:, link, :2].mean(axis=1)
+        tip = deflection[:, link, :2] @ _weights(slopes[link, :2])
         apart = gauges.lengths[link] - gauges.stations[link]
         rotation = np.arctan((tip - deflection[:, link, 2]) / apart)
         columns += [tip, strains[:, link] * gauges.lengths[link], rotation]

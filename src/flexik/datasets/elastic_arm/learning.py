@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flexik import parameters
 from flexik.datasets.elastic_arm import gauges
 from flexik.datasets.elastic_arm.provenance import readings_checksum
-from flexik.datasets.elastic_arm.readings import ANGLES, FIELDS, SELECTION, TRAINING
+from flexik.datasets.elastic_arm.readings import ANGLES, FIELDS, HELD_OUT, SELECTION, TRAINING
 from flexik.datasets.tables import Field, read_table
 from flexik.mechanisms.elastic_arm import DEFORMATION, elbow
 
@@ -38,6 +38,11 @@ class Kind:
 
 KINDS = {
     "gauges": Kind(_fields(*DEFORMATION, "p_x", "p_y"), _fields(*ANGLES)),
+    "gauges_without_dx": Kind(
+        _fields(*(name for name in DEFORMATION if not name.startswith("dx")), "p_x", "p_y"),
+        _fields(*ANGLES),
+    ),
+    "gauges_elbow": Kind(_fields(*DEFORMATION, "p_x", "p_y", "elbow"), _fields(*ANGLES)),
     "deflection": Kind(_fields(*ANGLES, "payload"), _fields("deflection_x", "deflection_y")),
     "inverse": Kind(_fields("tip_x", "tip_y", "payload", "elbow"), _fields(*ANGLES)),
 }
@@ -65,6 +70,23 @@ EVALUATION_FIELDS = (
     Field("error_y", "m", "desired minus achieved"),
     Field("error", "m", "length of the error"),
     Field("status", "1", "0 reached, else see flexik.positioning.method", "int64"),
+    Field("n_clipped", "1", "angles by a network that were clipped to the limits", "int64"),
+)
+SENSITIVITY_FIELDS = (
+    Field("network", "1", "name of the network", "string"),
+    Field("input", "1", "input that is off, or nothing", "string"),
+    Field("change", "1", "by how much it is off, m or rad"),
+    Field("reading", "1", "row of the readings, from 0", "int64"),
+    Field("error", "m", "of the flexible model's tip from its tip in the reading"),
+)
+PAYLOAD_ERROR_FIELDS = (
+    Field("method", "1", "name of the method", "string"),
+    Field("point", "1", "number of the target, from 0", "int64"),
+    Field("error", "m", "length of the error where the payload is told too large"),
+)
+SPLIT_FIELDS = (
+    Field("seed", "1", "of the division of the readings", "int64"),
+    *(Field(f"r_{name}", "1", f"R of {name} on its held-out readings") for name in ANGLES),
 )
 TARGET_FIELDS = (
     *EVALUATION_FIELDS[1:4],
@@ -101,16 +123,31 @@ def read_learning_data(folder: Path, arm: parameters.ElasticArm, name: str) -> L
 
     Raises DataError as `read_readings` does.
     """
+    inputs, outputs, part = read_all(folder, arm, name)
+    return divided(inputs, outputs, part)[0]
+
+
+def read_all(
+    folder: Path, arm: parameters.ElasticArm, name: str
+) -> tuple[Array, Array, NDArray[np.str_]]:
+    """Inputs (n, p) and outputs (n, q) of network `name` for every reading, and their part (n,)."""
     network = arm.all_networks[name]
     readings, shown = read_readings(folder, arm, network.readings or gauges.FREE_OF_NOISE)
-    table = learning_table(readings, shown, network.kind)
-    kind = KINDS[network.kind]
-    data = []
-    for part in (TRAINING, SELECTION):
-        rows = table[readings["part"] == part]
-        for fields in (kind.inputs, kind.outputs):
-            data.append(rows[[field.name for field in fields]].to_numpy())
-    return LearningData(*data)
+    table, kind = learning_table(readings, shown, network.kind), KINDS[network.kind]
+    inputs, outputs = (
+        table[[field.name for field in fields]].to_numpy() for fields in (kind.inputs, kind.outputs)
+    )
+    return inputs, outputs, readings["part"].to_numpy(dtype=str)
+
+
+def divided(
+    inputs: Array, outputs: Array, part: NDArray[np.str_]
+) -> tuple[LearningData, tuple[Array, Array]]:
+    """What trains and selects, and the inputs and outputs that are held out of both."""
+    training, selection, held_out = (
+        (inputs[part == name], outputs[part == name]) for name in (TRAINING, SELECTION, HELD_OUT)
+    )
+    return LearningData(*training, *selection), held_out
 
 
 def learning_table(readings: pd.DataFrame, shown: pd.DataFrame, kind: str) -> pd.DataFrame:

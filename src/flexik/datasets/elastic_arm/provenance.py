@@ -27,8 +27,13 @@ def network_checksum(arm: parameters.ElasticArm, name: str) -> str:
 
 def fit_checksum(arm: parameters.ElasticArm) -> str:
     """Checksum of everything that determines the fit of the networks given gauges."""
-    names = [name for name, network in arm.all_networks.items() if network.kind == "gauges"]
-    return checksum(*(network_checksum(arm, name) for name in names))
+    return checksum(*(network_checksum(arm, name) for name in arm.gauge_networks))
+
+
+def splits_checksum(arm: parameters.ElasticArm) -> str:
+    """Checksum of everything that determines the fit by other divisions of the readings."""
+    own = network_checksum(arm, arm.splits.network)
+    return checksum(own, parameters_checksum([arm.splits]))
 
 
 def targets_checksum(arm: parameters.ElasticArm) -> str:
@@ -43,3 +48,8 @@ def evaluation_checksum(arm: parameters.ElasticArm, label: str) -> str:
         method = arm.methods[label]
         parts += [parameters_checksum([method]), network_checksum(arm, method.network)]
     return checksum(*parts)
+
+
+def payload_error_checksum(arm: parameters.ElasticArm) -> str:
+    """Checksum of everything that determines the errors where the payload is told wrongly."""
+    return checksum(*(evaluation_checksum(arm, label) for label in arm.methods))

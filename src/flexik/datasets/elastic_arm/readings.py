@@ -1,12 +1,13 @@
 """The readings of the experiment: poses, payloads, what the model has there, and their division."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flexik import parameters
-from flexik.datasets.elastic_arm.gauges import Gauges
+from flexik.datasets.elastic_arm.gauges import FREE_OF_NOISE, NOISY_VOLTAGES, Gauges
 from flexik.datasets.tables import Field
 
 Array = NDArray[np.float64]
@@ -80,23 +81,27 @@ def columns_of(arrays: Sequence[NDArray], fields: Sequence[Field]) -> Mapping[st
     return {field.name: column for field, column in zip(fields, flat, strict=True)}
 
 
-def gauges_of(arm: parameters.ElasticArm) -> Gauges:
-    """The gauges of section `elastic_arm`."""
+def gauges_of(arm: parameters.ElasticArm, readings: str | None = None) -> Gauges:
+    """The gauges of section `elastic_arm` for `readings`: strains exact where noisy_voltages."""
     given = arm.gauges
-    return Gauges(
+    gauges = Gauges(
         lengths=arm.geometry.lengths,
         stations=given.deflection_stations,
         slopes=given.slopes,
         intercepts=given.intercepts,
         noise=given.noise,
+        voltage_range=given.voltage_range,
         resolution=given.resolution,
         strain_noise=given.strain_noise,
         strain_resolution=given.strain_resolution,
     )
+    exact = readings == NOISY_VOLTAGES
+    return replace(gauges, strain_noise=0.0, strain_resolution=0.0) if exact else gauges
 
 
 def noise_generator(
     arm: parameters.ElasticArm, readings: str | None, stream: int
 ) -> np.random.Generator | None:
     """Source of noise of `readings`: none where they are noise_free."""
-    return np.random.default_rng((arm.gauges.seed, stream)) if readings == "noisy" else None
+    quiet = readings is None or readings == FREE_OF_NOISE
+    return None if quiet else np.random.default_rng((arm.gauges.seed, stream))

@@ -205,8 +205,12 @@ class ArmModel:
         return float(moved + self.system.GetNodeParameter(node, "referenceCoordinates")[2])
 
     def _strain(self, link: PlacedBeam, station: int) -> float:
-        """Axial strain of the element that begins at a station, which is the same all along it."""
-        strain = self.system.GetObjectOutputBody(link.objects[station], STRAIN, [0.0, 0.0, 0.0])
+        """Axial strain of the element that begins at a station, which is the same all along it.
+
+        At the end of the link, that of the last element.
+        """
+        element = link.objects[min(station, len(link.objects) - 1)]
+        strain = self.system.GetObjectOutputBody(element, STRAIN, [0.0, 0.0, 0.0])
         return float(strain[0])
 
     def _clamp(self) -> None:

@@ -1,6 +1,7 @@
 """Methods of the arm from the parameters of params.yaml."""
 
 from flexik import parameters
+from flexik.datasets.elastic_arm.learning import KINDS
 from flexik.mechanisms.elastic_arm import ArmGeometry
 from flexik.positioning import combined, none
 from flexik.positioning.elastic_arm.closed_form import closed_form
@@ -19,11 +20,12 @@ def arm_method(
     geometry: ArmGeometry,
     network: Network,
     deformation: Array | None = None,
+    kind: str = "gauges",
 ) -> Method:
     """Method with the settings `method` and its trained `network`.
 
-    `deformation` (n, 6), what gauges show in the poses that it should find, is for kind `gauges`
-    alone; raises PositioningError if it is missing there.
+    `deformation` (n, 6), what gauges show in the poses that it should find, and the `kind` of the
+    network are for method `gauges` alone; raises PositioningError if the former is missing there.
     """
     if isinstance(method, parameters.CombinedMethod):
         ingredients = Ingredients(geometry, closed_form(geometry), {"deflection": network})
@@ -32,4 +34,5 @@ def arm_method(
         return InverseNetwork(geometry, network)
     if deformation is None:
         raise PositioningError("method gauges: expected the deformation that the gauges show")
-    return GaugeNetwork(geometry, network, deformation)
+    inputs = tuple(field.name for field in KINDS[kind].inputs)
+    return GaugeNetwork(geometry, network, inputs, deformation)

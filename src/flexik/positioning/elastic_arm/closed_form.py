@@ -11,8 +11,8 @@ def closed_form(geometry: ArmGeometry) -> RigidInverse:
     """Exact inverse on the elbow that `inverse_by_rule` chooses for the original target.
 
     So a correction of some millimetres does not turn the elbow over. Where the corrected target is
-    not reached with this elbow, the rule is asked again. The rule leaves nothing to choose, so the
-    current angles serve unreached rows only.
+    not reached with this elbow, the rule is asked again, which reaches what either elbow reaches.
+    The rule leaves nothing to choose, so the current angles serve unreached rows only.
     """
 
     def solve(
@@ -27,7 +27,6 @@ def closed_form(geometry: ArmGeometry) -> RigidInverse:
             side = elbow(np.nan_to_num(inverse_by_rule(geometry, original).angles))
             same = inverse(geometry, targets, side)
             angles = np.where(same.reached[:, None], same.angles, angles)
-            status = np.where(same.reached, REACHED, status)
         return RigidSolution(np.where((status == REACHED)[:, None], angles, current), status, {})
 
     return solve

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexik.mechanisms.elastic_arm import ArmGeometry, elbow, inverse_by_rule
+from flexik.mechanisms.elastic_arm import DEFORMATION, ArmGeometry, elbow, inverse_by_rule
 from flexik.positioning.method import REACHED, Array, Command, Network, checked
 
 
@@ -17,8 +17,9 @@ from flexik.positioning.method import REACHED, Array, Command, Network, checked
 class GaugeNetwork:
     """Angles as a network predicts them from deformation and target.
 
-    network : predicts both angles (rad) from the deformation (m and rad, 6 columns) and the tip
-        (m).
+    network : predicts both angles (rad) from `inputs`.
+    inputs : names of DEFORMATION (m and rad), p_x and p_y, which the target stands for, and elbow,
+        that of the rigid arm's rule.
     deformation : (n, 6), what gauges show in the poses that put the loaded tip on the n targets of
         the next call.
 
@@ -28,13 +29,17 @@ class GaugeNetwork:
 
     geometry: ArmGeometry
     network: Network
+    inputs: tuple[str, ...]
     deformation: Array
 
     def __call__(self, targets: Array, payload: Array, initial_strokes: Array) -> Command:
         """See `flexik.positioning.method.Method`."""
         targets = checked("targets", targets, None, 2)
         deformation = checked("deformation by the gauges", self.deformation, len(targets), 6)
-        predicted = self.network.predict(np.hstack([deformation, targets]))
+        side = elbow(np.nan_to_num(inverse_by_rule(self.geometry, targets).angles))
+        known = dict(zip(DEFORMATION, deformation.T, strict=True))
+        known |= {"p_x": targets[:, 0], "p_y": targets[:, 1], "elbow": side}
+        predicted = self.network.predict(np.column_stack([known[name] for name in self.inputs]))
         angles, n_clipped = _within(self.geometry, predicted, len(targets))
         return Command(angles, np.full(len(targets), REACHED), {"n_clipped": n_clipped})
 

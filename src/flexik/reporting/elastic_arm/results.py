@@ -1,6 +1,7 @@
 """Results of the stages of the elastic arm, and what the report counts in them."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -15,6 +16,7 @@ Array = NDArray[np.float64]
 
 # Nearer than this to the payload of a reading, a target's payload was learnt from, kg
 NEAR = 0.1
+_R = [f"r_{name}" for name in ANGLES]
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,15 @@ class Fit:
     max_error: float
 
 
+class SizeStudy(NamedTuple):
+    """Errors by size, the chosen layers, and how many of all runs stopped at the trainer's goal."""
+
+    sizes: pd.DataFrame
+    chosen: tuple[int, ...]
+    n_goal: int
+    n_runs: int
+
+
 @dataclass(frozen=True)
 class Results:
     """Tables of the stages, SI units.
@@ -40,8 +51,10 @@ class Results:
     fit : FIT_FIELDS of datasets.elastic_arm.learning.
     layers : neurons of every hidden layer by network.
     training : restarts of all networks, column `network` first.
-    studies : errors by size, and the chosen layers, by selected network.
+    studies : by selected network.
     errors : EVALUATION_FIELDS of datasets.elastic_arm.learning by method, `none` first.
+    targets : TARGET_FIELDS, in the order of `errors`; target_counts: drawn, reached and kept.
+    sensitivity, payload_error, splits : SENSITIVITY_FIELDS, PAYLOAD_ERROR_FIELDS and SPLIT_FIELDS.
     published : columns network, r_theta_1, r_theta_2.
     """
 
@@ -51,8 +64,13 @@ class Results:
     fit: pd.DataFrame
     layers: dict[str, tuple[int, ...]]
     training: pd.DataFrame
-    studies: dict[str, tuple[pd.DataFrame, tuple[int, ...]]]
+    studies: dict[str, SizeStudy]
     errors: dict[str, pd.DataFrame]
+    targets: pd.DataFrame
+    target_counts: dict[str, int]
+    sensitivity: pd.DataFrame
+    payload_error: pd.DataFrame
+    splits: pd.DataFrame
     published: pd.DataFrame
 
     @property
@@ -84,6 +102,32 @@ class Results:
             name: (self.fit_of(name, TRAINING), self.fit_of(name, HELD_OUT))
             for name in self.gauge_networks
         }
+
+    def target_r(self, name: str) -> Array:
+        """R (2,) of both angles at the random targets by the method of gauge network `name`.
+
+        NaN where no method takes the network, or its angles do not vary.
+        """
+        for label, method in self.arm.methods.items():
+            if method.network == name and method.method == "gauges":
+                columns = list(ANGLES)
+                commanded = self.errors[label][columns].to_numpy()
+                if np.ptp(commanded, axis=0).all():
+                    return correlation(self.targets[columns].to_numpy(), commanded)
+        return np.full(2, np.nan)
+
+    def on_border(self) -> tuple[int, int]:
+        """Held-out readings on the border of the grid of angles, and all held-out ones."""
+        angles = self.readings[list(ANGLES)].to_numpy()
+        ends = np.isclose(angles, angles.min(axis=0)) | np.isclose(angles, angles.max(axis=0))
+        held_out = (self.readings["part"] == HELD_OUT).to_numpy()
+        return int(ends.any(axis=1)[held_out].sum()), int(held_out.sum())
+
+    def all_splits(self) -> pd.DataFrame:
+        """R of the network of `splits` by every division, the main one first."""
+        main = self.fit_of(self.arm.splits.network, HELD_OUT).r
+        first = pd.DataFrame({"seed": [self.arm.readings.seed], **dict(zip(_R, main, strict=True))})
+        return pd.concat([first, self.splits], ignore_index=True)
 
     def published_r(self, name: str) -> Array:
         """Published correlation coefficients (2,) of network `name`, NaN where there is none."""
