@@ -215,7 +215,8 @@ def _positioning_text(results: Results) -> str:
             }.get(network.kind, "the target and the deformation")
             text = (
                 f"network `{method.network}` ({hidden}) of {told} that gauges "
-                f"({NOISE[network.readings or FREE_OF_NOISE]}) show in the very pose it should find. No controller knows that "
+                f"({NOISE[network.readings or FREE_OF_NOISE]}) show in the very pose it should "
+                "find. No controller knows that "
                 "before the arm is there."
             )
         elif method.method == "inverse":
@@ -244,8 +245,10 @@ def _fit_text(results: Results) -> str:
         f"gauges and the tip by equations 44 and "
         "45 from them, as in the paper, less or more where the column of gauges says so; R is the "
         f"correlation of network and target. {border} of the {held_out} held-out readings lie on "
-        "the border of the grid of angles, so that no reading beyond them trains. All have payloads "
-        "of the readings, while those of the random targets lie between. R at the random targets is "
+        "the border of the grid of angles, so that no reading beyond them trains. All have "
+        "payloads "
+        "of the readings, while those of the random targets lie between. R at the random targets "
+        "is "
         "that of the commanded angles."
     )
 
