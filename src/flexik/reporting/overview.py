@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from flexik.errors import DataError
 from flexik.reporting.tables import markdown
 
 NOT_AVAILABLE = "not available"
+ABSENT = "not in this run"
 
 
 @dataclass(frozen=True)
@@ -103,10 +103,7 @@ def overview(metrics: Mapping[str, Mapping[str, float]], published: Mapping[str,
     published
         Values by the names in ENTRIES, in the unit of the metric.
 
-    Raises
-    ------
-    DataError
-        If a metric is missing.
+    A metric that a run with other parameters does not have is told as such.
     """
     rows = []
     for entry in ENTRIES:
@@ -115,23 +112,23 @@ def overview(metrics: Mapping[str, Mapping[str, float]], published: Mapping[str,
             known = NOT_AVAILABLE
         elif entry.published is not None:
             known = format(entry.scale * published[entry.published], "g")
-        value = entry.scale * _value(metrics[entry.case], entry)
+        value = _value(metrics[entry.case], entry)
         rows.append(
             {
                 "case": CASES[entry.case],
                 "what": entry.what,
                 "published": known,
-                "flexik": format(value, entry.form),
+                "flexik": ABSENT if value is None else format(entry.scale * value, entry.form),
             }
         )
     return markdown(pd.DataFrame(rows))
 
 
-def _value(metrics: Mapping[str, float], entry: Entry) -> float:
-    """A metric; of the six-joint arm the mean over its joints."""
+def _value(metrics: Mapping[str, float], entry: Entry) -> float | None:
+    """A metric, or None; of the six-joint arm the mean over its joints."""
     names = [entry.metric]
     if entry.case == "fanuc":
         names = [f"{entry.metric}.joint{k}_error_percent" for k in range(1, 7)]
-    if missing := [name for name in names if name not in metrics]:
-        raise DataError(f"reports/{entry.case}/metrics.json: expected {missing} too")
+    if any(name not in metrics for name in names):
+        return None
     return sum(metrics[name] for name in names) / len(names)
