@@ -38,7 +38,7 @@ from flexik.errors import DataError, FlexikError
 from flexik.evaluation.fanuc.errors import statistics as error_statistics
 from flexik.evaluation.fanuc.errors import workspace_errors
 from flexik.learning.training import Architecture, trainer_settings
-from flexik.mechanisms.serial_arm import Pose, SerialArm, forward
+from flexik.kinematics.serial_arm import Pose, SerialArm, forward
 from flexik.parameters import load_parameters
 from flexik.positioning.fanuc.methods import (
     JointMethod,

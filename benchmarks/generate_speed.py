@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from flexik.datasets.crane.grid import INPUTS, KEPT, GridParts
 from flexik.errors import FlexikError, SolverError
-from flexik.mechanisms.crane import forward
+from flexik.kinematics.crane import forward
 from flexik.multibody.crane.model import CraneModel
 
 Array = NDArray[np.float64]

@@ -28,7 +28,7 @@ from flexik.datasets.crane.provenance import query_checksum, targets_checksum
 from flexik.datasets.tables import read_table
 from flexik.errors import DataError
 from flexik.evaluation.conditions import Conditions, all_conditions, random_conditions
-from flexik.mechanisms.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry
 from flexik.multibody.crane.assembly import read_spring_stiffness
 from flexik.parameters import load_parameters
 from flexik.positioning.crane.initial import initial_positions

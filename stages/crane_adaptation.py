@@ -25,7 +25,7 @@ from flexik.errors import ParameterError
 from flexik.evaluation.conditions import Conditions, random_conditions
 from flexik.evaluation.targets import draw_candidates
 from flexik.learning.perceptron import Network
-from flexik.mechanisms.crane import smallest_extension
+from flexik.kinematics.crane import smallest_extension
 from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.multibody.crane_measured.as_built import (

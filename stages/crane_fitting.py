@@ -20,7 +20,7 @@ from flexik.datasets.tables import read_table, write_table
 from flexik.errors import ParameterError, TrainingError
 from flexik.learning.perceptron import Network, quantities
 from flexik.learning.training import Architecture, train, trainer_settings
-from flexik.mechanisms.crane import forward
+from flexik.kinematics.crane import forward
 from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
 from flexik.multibody.crane.model import tips
 from flexik.parameters import load_parameters

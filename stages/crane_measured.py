@@ -21,7 +21,7 @@ from flexik.datasets.crane_measured.fields import MEASURED_FIELDS
 from flexik.datasets.crane_measured.own import own_campaign
 from flexik.datasets.tables import write_table
 from flexik.evaluation.conditions import all_conditions
-from flexik.mechanisms.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry
 from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
 from flexik.multibody.crane_measured.as_built import Magnitudes, as_built_tips, draw_twin
 from flexik.parameters import load_parameters

@@ -10,7 +10,7 @@ import numpy as np
 
 from flexik import stage
 from flexik.files import write_json
-from flexik.mechanisms.crane import forward
+from flexik.kinematics.crane import forward
 from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
 from flexik.multibody.crane.model import equilibrium, reference_shapes
 from flexik.parameters import load_parameters

@@ -18,7 +18,7 @@ from flexik.datasets.parallel import ParallelSettings, from_environment, paralle
 from flexik.datasets.tables import write_table
 from flexik.errors import ParameterError
 from flexik.evaluation.targets import Targets, draw_candidates, reachable_targets
-from flexik.mechanisms.crane import forward
+from flexik.kinematics.crane import forward
 from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
 from flexik.multibody.crane.model import FlexibleCrane, solve
 from flexik.parameters import load_parameters

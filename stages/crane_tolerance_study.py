@@ -17,7 +17,7 @@ from flexik.datasets.crane.provenance import tolerance_checksum
 from flexik.datasets.tables import write_table
 from flexik.evaluation.conditions import all_conditions
 from flexik.evaluation.tolerance import tolerance_study
-from flexik.mechanisms.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry
 from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
 from flexik.multibody.crane.model import tips
 from flexik.parameters import load_parameters

@@ -46,7 +46,7 @@ from flexik.evaluation.conditions import Conditions, random_conditions
 from flexik.evaluation.errors import evaluate, statistics
 from flexik.learning.perceptron import Network
 from flexik.learning.storage import load_network
-from flexik.mechanisms.elastic_arm import DEFORMATION, flexible_forward
+from flexik.kinematics.elastic_arm import DEFORMATION, flexible_forward
 from flexik.multibody.elastic_arm.assembly import flexible_arm
 from flexik.multibody.elastic_arm.model import Equilibria, FlexibleArm, equilibria
 from flexik.parameters import load_parameters

@@ -23,7 +23,7 @@ from flexik.datasets.elastic_arm.readings import (
     poses,
 )
 from flexik.datasets.tables import write_table
-from flexik.mechanisms.elastic_arm import flexible_forward, forward
+from flexik.kinematics.elastic_arm import flexible_forward, forward
 from flexik.multibody.elastic_arm.assembly import flexible_arm
 from flexik.multibody.elastic_arm.model import equilibria
 from flexik.parameters import load_parameters

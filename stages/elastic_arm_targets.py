@@ -19,7 +19,7 @@ from flexik.datasets.tables import write_table
 from flexik.errors import ParameterError
 from flexik.evaluation.targets import Targets, draw_candidates, reachable_targets
 from flexik.files import write_json
-from flexik.mechanisms.elastic_arm import forward
+from flexik.kinematics.elastic_arm import forward
 from flexik.multibody.elastic_arm.assembly import flexible_arm
 from flexik.multibody.elastic_arm.model import FlexibleArm, solve
 from flexik.parameters import load_parameters

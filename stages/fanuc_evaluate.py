@@ -24,7 +24,7 @@ from flexik.datasets.fanuc.tables import (
 )
 from flexik.datasets.tables import read_table
 from flexik.evaluation.fanuc.judging import errors_beside_path, errors_on_path, errors_on_targets
-from flexik.mechanisms.serial_arm import SerialArm
+from flexik.kinematics.serial_arm import SerialArm
 from flexik.parameters import load_parameters
 from flexik.positioning.fanuc.methods import (
     closed_form,

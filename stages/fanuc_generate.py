@@ -18,7 +18,7 @@ from flexik.datasets.fanuc.tables import (
     poses_checksum,
 )
 from flexik.datasets.tables import write_table
-from flexik.mechanisms.serial_arm import SerialArm, forward
+from flexik.kinematics.serial_arm import SerialArm, forward
 from flexik.parameters import load_parameters
 
 DATA = Path("data/fanuc")

@@ -18,8 +18,8 @@ from flexik.datasets.parallel import ParallelSettings, from_environment, paralle
 from flexik.datasets.tables import read_table
 from flexik.learning.storage import save_network
 from flexik.learning.training import Architecture, trainer_settings
-from flexik.mechanisms.fanuc import N_CONFIGURATIONS
-from flexik.mechanisms.serial_arm import SerialArm
+from flexik.kinematics.fanuc import N_CONFIGURATIONS
+from flexik.kinematics.serial_arm import SerialArm
 from flexik.parameters import load_parameters
 from flexik.positioning.fanuc.training import WorkspaceTask, train_workspace
 

@@ -17,10 +17,10 @@ from flexik.datasets.fanuc.samples import taught_path
 from flexik.datasets.smartee.poses import corner_poses, draw, geometry_of, joints_of, path_poses
 from flexik.errors import DataError, FlexikError, ParameterError
 from flexik.files import write_text
-from flexik.mechanisms.crane import CraneGeometry, check_assembly, smallest_extension
-from flexik.mechanisms.elastic_arm import inverse_by_rule
-from flexik.mechanisms.fanuc import check_spherical_wrist
-from flexik.mechanisms.serial_arm import SerialArm
+from flexik.kinematics.crane import CraneGeometry, check_assembly, smallest_extension
+from flexik.kinematics.elastic_arm import inverse_by_rule
+from flexik.kinematics.fanuc import check_spherical_wrist
+from flexik.kinematics.serial_arm import SerialArm
 from flexik.multibody.crane.assembly import flexible_crane
 from flexik.multibody.elastic_arm.assembly import flexible_arm
 from flexik.parameters import load_parameters

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from smoke_pipeline import ROOT, environment
 
-from flexik.mechanisms.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry
 
 
 @pytest.fixture(scope="session")

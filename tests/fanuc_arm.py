@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from flexik.mechanisms.serial_arm import SerialArm
+from flexik.kinematics.serial_arm import SerialArm
 
 LIMITS = np.deg2rad([[-180, -90, -160, -360, -125, -360], [180, 135, 280, 360, 125, 360]])
 ARM = SerialArm(

@@ -11,7 +11,7 @@ import yaml
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "flexik"
 ROOMS = (
-    *("mechanisms", "multibody", "datasets", "learning"),
+    *("kinematics", "multibody", "datasets", "learning"),
     *("positioning", "evaluation", "reporting"),
 )
 # Shared modules and what they may import of flexik
@@ -94,7 +94,7 @@ def test_heavy_libraries_have_one_home(path):
         assert path.is_relative_to(home) or path.parent.name == "benchmarks", library
 
 
-@pytest.mark.parametrize("path", sorted((SOURCE / "mechanisms").glob("*.py")), ids=relative)
+@pytest.mark.parametrize("path", sorted((SOURCE / "kinematics").glob("*.py")), ids=relative)
 def test_mechanisms_need_only_numpy(path):
     assert libraries(path) <= {"numpy", "flexik", *sys.stdlib_module_names}
 

@@ -12,7 +12,7 @@ from flexik.datasets.crane.grid import STROKES
 from flexik.datasets.crane_measured.own import own_campaign
 from flexik.errors import DataError, ParameterError
 from flexik.evaluation.conditions import all_conditions
-from flexik.mechanisms.crane import forward, inverse_with_smallest_extension, pose
+from flexik.kinematics.crane import forward, inverse_with_smallest_extension, pose
 from flexik.multibody.crane.assembly import flexible_crane
 from flexik.multibody.crane.model import equilibrium
 from flexik.multibody.crane_measured.as_built import Magnitudes, as_built_tips, draw_twin

@@ -32,7 +32,7 @@ from flexik.datasets.crane.grid import (
 from flexik.datasets.parallel import ParallelSettings
 from flexik.datasets.tables import read_table
 from flexik.errors import ParameterError, SolverError
-from flexik.mechanisms.crane import forward
+from flexik.kinematics.crane import forward
 from flexik.multibody.crane.assembly import flexible_crane
 from flexik.multibody.crane.model import tips
 from flexik.parameters import load_parameters

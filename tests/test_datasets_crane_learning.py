@@ -19,7 +19,7 @@ from flexik.datasets.crane.learning import (
 from flexik.datasets.crane.provenance import grid_checksum, selection_checksum
 from flexik.datasets.tables import write_table
 from flexik.errors import DataError
-from flexik.mechanisms.crane import forward, inverse
+from flexik.kinematics.crane import forward, inverse
 from flexik.parameters import load_parameters
 
 ROOT = Path(__file__).parents[1]

@@ -22,7 +22,7 @@ from flexik.datasets.elastic_arm.readings import (
 )
 from flexik.datasets.tables import write_table
 from flexik.errors import DataError
-from flexik.mechanisms.elastic_arm import flexible_forward, forward
+from flexik.kinematics.elastic_arm import flexible_forward, forward
 from flexik.multibody.elastic_arm.model import Equilibria, equilibria
 from flexik.parameters import overlay, read_yaml, validate
 

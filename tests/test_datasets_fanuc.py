@@ -19,8 +19,8 @@ from flexik.datasets.fanuc.tables import (
     workspace_network_checksum,
 )
 from flexik.errors import ParameterError
-from flexik.mechanisms.fanuc import canonical, configuration, inverse
-from flexik.mechanisms.serial_arm import Pose, forward, jacobian
+from flexik.kinematics.fanuc import canonical, configuration, inverse
+from flexik.kinematics.serial_arm import Pose, forward, jacobian
 from flexik.parameters import load_parameters, overlay, read_yaml, validate
 
 ROOT = Path(__file__).parents[1]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flexik.datasets.crane.learning import stroke_error_at_tip
-from flexik.mechanisms.crane import forward
+from flexik.kinematics.crane import forward
 
 INPUTS = np.array([[4.0, 1.0, 200.0, 0.5], [3.0, 2.0, 50.0, 1.0], [5.0, 0.0, 400.0, 1.6]])
 STROKES = np.array([[0.2, 0.3], [0.3, 0.4], [0.1, 0.2]])

@@ -23,7 +23,7 @@ from flexik.datasets.smartee.poses import (
 )
 from flexik.datasets.smartee.provenance import evaluation_checksum
 from flexik.errors import DataError, ParameterError
-from flexik.mechanisms.smartee import (
+from flexik.kinematics.smartee import (
     closure,
     complete_direct,
     elbow_circles,

@@ -14,8 +14,8 @@ from flexik.evaluation.targets import (
     reachable_targets,
     solve_targets,
 )
-from flexik.mechanisms.crane import forward
-from flexik.mechanisms.status import ACTUATOR_LIMIT
+from flexik.kinematics.crane import forward
+from flexik.kinematics.status import ACTUATOR_LIMIT
 from flexik.multibody.crane.assembly import flexible_crane
 from flexik.multibody.crane.model import solve, tips
 from flexik.parameters import load_parameters

@@ -7,7 +7,7 @@ import pytest
 
 from flexik.datasets.crane.grid import random_samples
 from flexik.errors import ParameterError, SolverError
-from flexik.mechanisms.crane import forward, pose, rotate
+from flexik.kinematics.crane import forward, pose, rotate
 from flexik.multibody.crane.assembly import flexible_crane
 from flexik.multibody.crane.model import RODS, CraneModel, tips
 from flexik.multibody.crane_measured.as_built import (

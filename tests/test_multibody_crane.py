@@ -8,7 +8,7 @@ import virtual_work
 
 from flexik.datasets.crane.grid import random_samples
 from flexik.errors import SolverError
-from flexik.mechanisms.crane import forward
+from flexik.kinematics.crane import forward
 from flexik.multibody.crane.assembly import flexible_crane
 from flexik.multibody.crane.model import CraneModel, equilibrium, reference_shapes, solve, tips
 from flexik.parameters import load_parameters

@@ -7,7 +7,7 @@ import pytest
 from elastic_arm import ARM, GEOMETRY, MODEL
 
 from flexik.errors import SolverError
-from flexik.mechanisms.elastic_arm import flexible_forward, forward
+from flexik.kinematics.elastic_arm import flexible_forward, forward
 from flexik.multibody.elastic_arm.model import ArmModel, Tube, equilibria, solve
 
 PAYLOADS = np.arange(4.0)  # kg

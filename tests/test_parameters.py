@@ -11,7 +11,7 @@ import yaml
 from pydantic import BaseModel
 
 from flexik.errors import ParameterError
-from flexik.mechanisms.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry
 from flexik.parameters import (
     Parameters,
     load_parameters,

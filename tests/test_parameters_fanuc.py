@@ -9,8 +9,8 @@ from fanuc_arm import ARM
 
 from flexik.errors import ParameterError
 from flexik.learning.weights import initial_weights
-from flexik.mechanisms.pose_representation import INPUTS, OUTPUTS
-from flexik.mechanisms.serial_arm import SerialArm
+from flexik.kinematics.pose_representation import INPUTS, OUTPUTS
+from flexik.kinematics.serial_arm import SerialArm
 from flexik.parameters import read_yaml, validate
 from flexik.parameters.fanuc import N_OUTPUTS, N_POSE, n_weights
 

@@ -15,7 +15,7 @@ from flexik.datasets.crane.evaluations import TARGET_FIELDS, TOLERANCE_FIELDS
 from flexik.datasets.crane.grid import FIELDS
 from flexik.datasets.tables import read_table, stored_fields
 from flexik.learning.storage import load_network
-from flexik.mechanisms.crane import forward
+from flexik.kinematics.crane import forward
 
 METHODS = ("none", *CRANE["methods"])
 STATISTICS = (

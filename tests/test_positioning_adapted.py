@@ -7,8 +7,8 @@ import pytest
 from smoke_pipeline import ROOT
 
 from flexik.errors import ParameterError
-from flexik.mechanisms.crane import forward, inverse_with_smallest_extension, pose
-from flexik.mechanisms.status import REACHED
+from flexik.kinematics.crane import forward, inverse_with_smallest_extension, pose
+from flexik.kinematics.status import REACHED
 from flexik.multibody.crane.assembly import flexible_crane
 from flexik.multibody.crane.model import equilibrium, tips
 from flexik.multibody.crane_measured.as_built import Magnitudes, as_built_tips, draw_twin

@@ -7,7 +7,7 @@ import pytest
 
 from flexik.errors import FlexikError
 from flexik.learning.perceptron import Network, Normalisation, Quantity
-from flexik.mechanisms.crane import forward
+from flexik.kinematics.crane import forward
 from flexik.parameters import load_parameters
 from flexik.positioning.combined import Combined
 from flexik.positioning.crane.assembly import crane_method, uncompensated

@@ -14,8 +14,8 @@ from flexik.evaluation.conditions import random_conditions
 from flexik.evaluation.errors import evaluate
 from flexik.evaluation.regression import correlation
 from flexik.evaluation.targets import reachable_targets
-from flexik.mechanisms.elastic_arm import DEFORMATION, elbow, forward, inverse_by_rule
-from flexik.mechanisms.status import OUT_OF_REACH, REACHED
+from flexik.kinematics.elastic_arm import DEFORMATION, elbow, forward, inverse_by_rule
+from flexik.kinematics.status import OUT_OF_REACH, REACHED
 from flexik.multibody.elastic_arm.model import equilibria, solve
 from flexik.positioning.elastic_arm.assembly import arm_method, uncompensated
 from flexik.positioning.elastic_arm.closed_form import closed_form

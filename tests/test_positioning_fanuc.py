@@ -11,9 +11,9 @@ from fanuc_arm import ARM, random_joints
 from flexik.evaluation.fanuc.errors import statistics, workspace_errors
 from flexik.evaluation.fanuc.judging import errors_beside_path, errors_on_path, errors_on_targets
 from flexik.learning.training import Architecture, BackPropagation, trainer_settings
-from flexik.mechanisms.fanuc import canonical, configuration
-from flexik.mechanisms.pose_representation import joint_outputs, pose_inputs
-from flexik.mechanisms.serial_arm import Pose, forward
+from flexik.kinematics.fanuc import canonical, configuration
+from flexik.kinematics.pose_representation import joint_outputs, pose_inputs
+from flexik.kinematics.serial_arm import Pose, forward
 from flexik.parameters import load_parameters
 from flexik.positioning.fanuc.methods import (
     closed_form,

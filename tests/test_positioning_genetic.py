@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flexik.errors import ParameterError
-from flexik.mechanisms.crane import forward
+from flexik.kinematics.crane import forward
 from flexik.positioning.crane import genetic as module
 from flexik.positioning.crane.genetic import GeneticSettings, first_generation, genetic
 from flexik.positioning.crane.initial import initial_positions

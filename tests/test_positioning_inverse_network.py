@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from flexik.evaluation.conditions import all_conditions
-from flexik.mechanisms.crane import forward, inverse, smallest_extension
-from flexik.mechanisms.status import OUT_OF_REACH, REACHED
+from flexik.kinematics.crane import forward, inverse, smallest_extension
+from flexik.kinematics.status import OUT_OF_REACH, REACHED
 from flexik.positioning.crane.closed_form import closed_form
 from flexik.positioning.crane.initial import initial_positions
 from flexik.positioning.crane.methods import build_method

@@ -9,8 +9,8 @@ import pytest
 
 from flexik.errors import ParameterError
 from flexik.evaluation.conditions import all_conditions
-from flexik.mechanisms.crane import forward, inverse, smallest_extension
-from flexik.mechanisms.status import REACHED
+from flexik.kinematics.crane import forward, inverse, smallest_extension
+from flexik.kinematics.status import REACHED
 from flexik.positioning.combined import Combined
 from flexik.positioning.crane.closed_form import closed_form
 from flexik.positioning.crane.genetic import GeneticSettings, genetic

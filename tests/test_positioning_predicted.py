@@ -9,7 +9,7 @@ from smoke_pipeline import ROOT
 
 from flexik.datasets.crane.grid import STROKES
 from flexik.evaluation.crane_measured.predictions import measurements, misfit, outliers, predictions
-from flexik.mechanisms.crane import forward, inverse_with_smallest_extension
+from flexik.kinematics.crane import forward, inverse_with_smallest_extension
 from flexik.multibody.crane.assembly import flexible_crane
 from flexik.parameters import load_parameters
 from flexik.positioning.crane_measured.adapted import (

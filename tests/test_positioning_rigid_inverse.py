@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flexik.errors import UnreachableError
-from flexik.mechanisms import crane
+from flexik.kinematics import crane
 from flexik.positioning.crane.closed_form import closed_form
 from flexik.positioning.crane.initial import initial_positions
 from flexik.positioning.method import REACHED, PositioningError

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from flexik.mechanisms.crane import inverse_with_smallest_extension
+from flexik.kinematics.crane import inverse_with_smallest_extension
 from flexik.multibody.crane.assembly import flexible_crane
 from flexik.multibody.crane.model import tips
 from flexik.parameters import load_parameters

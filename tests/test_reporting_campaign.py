@@ -11,7 +11,7 @@ from flexik.datasets.tables import read_csv
 from flexik.errors import DataError
 from flexik.evaluation.crane_measured.campaign import campaign_errors, campaign_table
 from flexik.evaluation.errors import STATISTICS
-from flexik.mechanisms.crane import inverse_with_smallest_extension
+from flexik.kinematics.crane import inverse_with_smallest_extension
 from flexik.reporting import style
 from flexik.reporting.crane_measured import campaign_figures, campaign_tables
 from flexik.reporting.tables import markdown

@@ -10,7 +10,7 @@ import pytest
 from flexik.errors import DataError
 from flexik.evaluation import operations
 from flexik.learning.perceptron import Network, Normalisation, Quantity
-from flexik.mechanisms.status import ACTUATOR_LIMIT
+from flexik.kinematics.status import ACTUATOR_LIMIT
 from flexik.parameters import load_parameters
 from flexik.positioning.method import NOT_CONVERGED
 from flexik.reporting.crane import learning_tables

@@ -21,7 +21,7 @@ from flexik.datasets.elastic_arm.readings import (
 )
 from flexik.errors import DataError
 from flexik.learning.size_selection import by_size
-from flexik.mechanisms.elastic_arm import DEFORMATION, flexible_forward, forward
+from flexik.kinematics.elastic_arm import DEFORMATION, flexible_forward, forward
 from flexik.multibody.elastic_arm.model import equilibria
 from flexik.reporting.elastic_arm import figures
 from flexik.reporting.elastic_arm.report import metrics, write_report

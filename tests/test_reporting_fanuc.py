@@ -14,8 +14,8 @@ from flexik.datasets.fanuc.samples import taught_path
 from flexik.datasets.fanuc.tables import COMMANDED, JOINTS, joint_columns
 from flexik.errors import DataError
 from flexik.evaluation.fanuc.errors import workspace_errors
-from flexik.mechanisms.fanuc import configuration
-from flexik.mechanisms.serial_arm import forward
+from flexik.kinematics.fanuc import configuration
+from flexik.kinematics.serial_arm import forward
 from flexik.parameters import overlay, read_yaml, validate
 from flexik.reporting.fanuc import figures, notes, tables
 from flexik.reporting.fanuc.report import metrics, write_report

@@ -11,7 +11,7 @@ from matplotlib.patches import Polygon
 
 from flexik.errors import DataError
 from flexik.evaluation.errors import STATISTICS
-from flexik.mechanisms.crane import forward, pose
+from flexik.kinematics.crane import forward, pose
 from flexik.positioning.crane.initial import initial_positions
 from flexik.reporting import style
 from flexik.reporting.crane import error_figures

@@ -27,8 +27,8 @@ from flexik.evaluation.smartee.errors import (
     newton_table,
     outside_poses,
 )
-from flexik.mechanisms.smartee import closure_jacobian, elbow_circles, leg_tip_velocities, leg_tips
-from flexik.mechanisms.smartee_newton import newton_steps
+from flexik.kinematics.smartee import closure_jacobian, elbow_circles, leg_tip_velocities, leg_tips
+from flexik.kinematics.smartee_newton import newton_steps
 from flexik.reporting.smartee import notes, start_study, tables
 from flexik.reporting.smartee.draws import draws
 from flexik.reporting.smartee.report import metrics, write_report

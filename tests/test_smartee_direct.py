@@ -28,7 +28,7 @@ from flexik.evaluation.smartee.errors import (
 )
 from flexik.learning.perceptron import quantities
 from flexik.learning.training import Architecture, LevenbergMarquardtAccelerated, train
-from flexik.mechanisms.smartee import rotation_zyz
+from flexik.kinematics.smartee import rotation_zyz
 from flexik.positioning.smartee.direct import (
     along_path,
     by_network,
@@ -103,7 +103,7 @@ def test_orientation_error_is_that_of_the_published_arc_cosines():
     poses, joints = draw(SMARTEE, "validation")
     elbows = joints[..., 2] + np.random.default_rng(1).normal(scale=0.01, size=(12, 3))
     found = errors(GEOMETRY, poses, joints[..., :2], joints[..., 2], elbows)
-    from flexik.mechanisms.smartee import complete_direct
+    from flexik.kinematics.smartee import complete_direct
 
     _, computed = complete_direct(GEOMETRY, joints[..., :2], elbows)
     truth = rotation_zyz(poses[:, 3:])

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from flexik.errors import ParameterError
-from flexik.mechanisms.crane import CraneGeometry, check_assembly
+from flexik.kinematics.crane import CraneGeometry, check_assembly
 from flexik.parameters import load_parameters
 
 ROOT = Path(__file__).resolve().parents[1]

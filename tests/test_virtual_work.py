@@ -19,7 +19,7 @@ from virtual_work import (
     solve_nonlinear,
 )
 
-from flexik.mechanisms.crane import pose
+from flexik.kinematics.crane import pose
 
 SPRING = 8e6
 MODULUS = 210e9

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import fsolve
 
-from flexik.mechanisms.crane import CraneGeometry, pose
+from flexik.kinematics.crane import CraneGeometry, pose
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float]

@@ -24,7 +24,7 @@ TAKEN_NAMES = (
 )
 # A method with Newton steps after it
 TAKEN_END = re.compile(r"_refined_\d+$")
-# Columns: position; pose and what stands for joints, see mechanisms.pose_representation
+# Columns: position; pose and what stands for joints, see kinematics.pose_representation
 N_POSITION, N_JOINTS, N_POSE, N_OUTPUTS = 3, 6, 12, 9
 MM = 1e3
 
@@ -47,7 +47,7 @@ class Joint(Model):
 
 
 class Refinement(Model):
-    """Damped Newton steps, see mechanisms.serial_arm.refine."""
+    """Damped Newton steps, see kinematics.serial_arm.refine."""
 
     damping: Positive
     orientation_length: Positive

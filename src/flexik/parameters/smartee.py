@@ -22,7 +22,7 @@ CENTRE, PREVIOUS = "centre", "previous"
 
 
 class Geometry(Model):
-    """Lengths, see mechanisms.smartee.SmartEEGeometry."""
+    """Lengths, see kinematics.smartee.SmartEEGeometry."""
 
     first_link: Positive
     second_link: Positive

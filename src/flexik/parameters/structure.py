@@ -17,7 +17,7 @@ from flexik.parameters.model import (
 
 
 class Geometry(Model):
-    """Rigid kinematics, see mechanisms.crane.CraneGeometry; m."""
+    """Rigid kinematics, see kinematics.crane.CraneGeometry; m."""
 
     lift_pivot: Vector
     lift_cylinder_base: Vector

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flexik.errors import FlexikError
-from flexik.mechanisms import status
+from flexik.kinematics import status
 
 Array = NDArray[np.float64]
 Diagnostics = dict[str, NDArray]

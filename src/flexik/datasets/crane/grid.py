@@ -14,7 +14,7 @@ from flexik.datasets.parallel import ParallelSettings, parallel_map
 from flexik.datasets.resumable import compute_table
 from flexik.datasets.tables import Field
 from flexik.errors import ParameterError
-from flexik.mechanisms.crane import CraneGeometry, forward
+from flexik.kinematics.crane import CraneGeometry, forward
 from flexik.multibody.crane.model import FlexibleCrane, solve, tips
 
 Array = NDArray[np.float64]

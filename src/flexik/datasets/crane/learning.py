@@ -14,7 +14,7 @@ from flexik import parameters
 from flexik.datasets.crane.grid import FIELDS, STROKES, deflection, kept
 from flexik.datasets.crane.provenance import grid_checksum, selection_checksum
 from flexik.datasets.tables import Field, read_table
-from flexik.mechanisms.crane import CraneGeometry, forward, inverse
+from flexik.kinematics.crane import CraneGeometry, forward, inverse
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from flexik.datasets.crane.grid import STROKES
 from flexik.datasets.crane_measured.campaign import LARGEST_ERROR, TARGET, read_campaign
 from flexik.datasets.crane_measured.fields import MEASURED_FIELDS
 from flexik.errors import DataError
-from flexik.mechanisms.crane import CraneGeometry, forward, smallest_extension
+from flexik.kinematics.crane import CraneGeometry, forward, smallest_extension
 
 # a sensor may say a little beyond the ends of its cylinder, m
 STROKE_TOLERANCE = 0.01

@@ -12,7 +12,7 @@ from flexik.datasets.elastic_arm import gauges
 from flexik.datasets.elastic_arm.provenance import readings_checksum
 from flexik.datasets.elastic_arm.readings import ANGLES, FIELDS, HELD_OUT, SELECTION, TRAINING
 from flexik.datasets.tables import Field, read_table
-from flexik.mechanisms.elastic_arm import DEFORMATION, elbow
+from flexik.kinematics.elastic_arm import DEFORMATION, elbow
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from scipy.interpolate import CubicSpline
 
 from flexik import parameters
 from flexik.errors import ParameterError
-from flexik.mechanisms.fanuc import N_CONFIGURATIONS, admissible, canonical, configuration
-from flexik.mechanisms.serial_arm import Array, Pose, SerialArm
+from flexik.kinematics.fanuc import N_CONFIGURATIONS, admissible, canonical, configuration
+from flexik.kinematics.serial_arm import Array, Pose, SerialArm
 
 # Joints drawn at once, and at most, until an arm configuration has its poses
 _DRAW, _MAXIMUM_DRAWN = 50_000, 20_000_000

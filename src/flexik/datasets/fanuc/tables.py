@@ -8,7 +8,7 @@ import pandas as pd
 from flexik import parameters
 from flexik.datasets.tables import Field, read_table, write_table
 from flexik.files import checksum
-from flexik.mechanisms.serial_arm import Array
+from flexik.kinematics.serial_arm import Array
 from flexik.parameters import parameters_checksum
 
 JOINTS = tuple(f"joint_{k}" for k in range(1, 7))

@@ -12,8 +12,8 @@ from flexik import parameters
 from flexik.datasets.smartee.provenance import poses_checksum
 from flexik.datasets.tables import Field, read_table, write_table
 from flexik.errors import DataError, ParameterError
-from flexik.mechanisms.smartee import N_LEGS, SmartEEGeometry, inverse, rotation_zyz
-from flexik.mechanisms.status import REACHED
+from flexik.kinematics.smartee import N_LEGS, SmartEEGeometry, inverse, rotation_zyz
+from flexik.kinematics.status import REACHED
 
 Array = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from flexik.mechanisms.fanuc import configuration
-from flexik.mechanisms.serial_arm import Array, Pose, SerialArm, forward, pose_errors
+from flexik.kinematics.fanuc import configuration
+from flexik.kinematics.serial_arm import Array, Pose, SerialArm, forward, pose_errors
 
 STATISTICS = (
     "mean_position_error",

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from flexik.datasets.fanuc.samples import beside
 from flexik.datasets.fanuc.tables import COMMANDED, joint_columns
 from flexik.evaluation.fanuc.errors import workspace_errors
-from flexik.mechanisms.fanuc import configuration, inverse
-from flexik.mechanisms.serial_arm import Array, SerialArm, forward, smallest_singular_value
+from flexik.kinematics.fanuc import configuration, inverse
+from flexik.kinematics.serial_arm import Array, SerialArm, forward, smallest_singular_value
 from flexik.positioning.fanuc.methods import JointMethod, refined
 
 Methods = Mapping[str, JointMethod]

@@ -11,14 +11,14 @@ from flexik import parameters
 from flexik.datasets.smartee.poses import geometry_of, in_box
 from flexik.datasets.tables import Field
 from flexik.learning.perceptron import Normalisation
-from flexik.mechanisms.smartee import (
+from flexik.kinematics.smartee import (
     SmartEEGeometry,
     complete_direct,
     inverse,
     rotation_zyz,
 )
-from flexik.mechanisms.smartee_newton import closed, solve_elbows, wrapped
-from flexik.mechanisms.status import REACHED
+from flexik.kinematics.smartee_newton import closed, solve_elbows, wrapped
+from flexik.kinematics.status import REACHED
 from flexik.positioning.smartee.direct import centre_elbows
 
 Array = NDArray[np.float64]
@@ -33,12 +33,12 @@ ERROR_FIELDS = (
     Field("position_error", "m", "distance of computed and true position, equation 7"),
     Field("orientation_error", "rad", "norm of the arc cosines of z and x axes, as printed"),
     Field("angle_error", "rad", "norm of the angles between the z axes and the x axes"),
-    Field("status", "1", "codes of mechanisms.smartee_newton.STATUS_MEANING", "int64"),
+    Field("status", "1", "codes of kinematics.smartee_newton.STATUS_MEANING", "int64"),
     Field("residual", "1", "largest closure error over the squared side of the plate"),
 )
 NEWTON_FIELDS = (
     *ERROR_FIELDS[2:5],
-    Field("status", "1", "codes of mechanisms.smartee_newton.STATUS_MEANING", "int64"),
+    Field("status", "1", "codes of kinematics.smartee_newton.STATUS_MEANING", "int64"),
     Field("n_steps", "1", "Newton steps made", "int64"),
     Field("residual", "1", "largest closure error over the squared side of the plate"),
     Field("elbow_error", "rad", "norm of the error of the three elbows, equation 5"),

@@ -6,7 +6,7 @@ from pathlib import Path
 from flexik import parameters
 from flexik.errors import DataError
 from flexik.files import read_json
-from flexik.mechanisms.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry
 from flexik.multibody.beams import Beam, read_section
 from flexik.multibody.crane.model import FlexibleCrane
 from flexik.multibody.crane.structure import CraneStructure, Rod

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from flexik.mechanisms.crane import forward
+from flexik.kinematics.crane import forward
 from flexik.multibody.beams import Array
 from flexik.multibody.crane.model import FlexibleCrane, tips
 from flexik.multibody.elements import ELEMENTS

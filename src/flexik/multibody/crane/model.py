@@ -12,7 +12,7 @@ import numpy as np
 from exudyn import itemInterface as item
 
 from flexik.errors import SolverError
-from flexik.mechanisms.crane import CranePose, Vector, pose
+from flexik.kinematics.crane import CranePose, Vector, pose
 from flexik.multibody.beams import Array, Elements
 from flexik.multibody.crane.structure import SLIDING, FlexibleCrane, Meshes, Rod, beam_meshes
 from flexik.multibody.elements import place_beam

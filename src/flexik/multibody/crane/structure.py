@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from flexik.mechanisms.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry
 from flexik.multibody.beams import Beam, Elements, discretise
 
 BEAMS = ("pillar", "lift", "jib", "extension")

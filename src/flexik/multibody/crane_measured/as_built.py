@@ -11,8 +11,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from flexik.errors import ParameterError, SolverError
-from flexik.mechanisms.crane import CraneGeometry, check_assembly
-from flexik.mechanisms.crane_dimensions import LENGTHS, VECTORS, corrected
+from flexik.kinematics.crane import CraneGeometry, check_assembly
+from flexik.kinematics.crane_dimensions import LENGTHS, VECTORS, corrected
 from flexik.multibody.beams import Array
 from flexik.multibody.crane.model import PIVOTS, RODS, CraneModel, listed, solve
 from flexik.multibody.crane.structure import BEAMS, CraneStructure, FlexibleCrane

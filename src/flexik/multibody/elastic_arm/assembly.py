@@ -3,7 +3,7 @@
 import numpy as np
 
 from flexik import parameters
-from flexik.mechanisms.elastic_arm import ArmGeometry
+from flexik.kinematics.elastic_arm import ArmGeometry
 from flexik.multibody.elastic_arm.model import FlexibleArm, Tube
 
 

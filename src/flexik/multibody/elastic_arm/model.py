@@ -13,7 +13,7 @@ import numpy as np
 from exudyn import itemInterface as item
 
 from flexik.errors import SolverError
-from flexik.mechanisms.elastic_arm import ArmGeometry
+from flexik.kinematics.elastic_arm import ArmGeometry
 from flexik.multibody.beams import Array, Beam, Elements, Section, discretise, nearest
 from flexik.multibody.elements import PlacedBeam, place_beam
 

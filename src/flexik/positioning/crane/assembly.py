@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from flexik import parameters
-from flexik.mechanisms.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry
 from flexik.positioning.crane.closed_form import closed_form
 from flexik.positioning.crane.genetic import GeneticSettings, genetic
 from flexik.positioning.crane.methods import build_method

@@ -5,7 +5,7 @@ A genetic algorithm with the same signature stands in genetic.py.
 
 import numpy as np
 
-from flexik.mechanisms.crane import CraneGeometry, inverse, smallest_extension
+from flexik.kinematics.crane import CraneGeometry, inverse, smallest_extension
 from flexik.positioning.method import Array, checked
 from flexik.positioning.rigid_inverse import RigidInverse, RigidSolution
 

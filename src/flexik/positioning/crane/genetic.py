@@ -14,8 +14,8 @@ from pymoo.operators.crossover.sbx import SBX
 from pymoo.operators.mutation.pm import PM
 
 from flexik.errors import ParameterError
-from flexik.mechanisms.crane import CraneGeometry, forward
-from flexik.mechanisms.status import REACHED
+from flexik.kinematics.crane import CraneGeometry, forward
+from flexik.kinematics.status import REACHED
 from flexik.positioning.method import NOT_CONVERGED, Array, checked
 from flexik.positioning.rigid_inverse import RigidInverse, RigidSolution
 

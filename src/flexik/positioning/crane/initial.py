@@ -3,7 +3,7 @@
 import numpy as np
 
 from flexik.errors import UnreachableError
-from flexik.mechanisms.crane import CraneGeometry, inverse_with_smallest_extension
+from flexik.kinematics.crane import CraneGeometry, inverse_with_smallest_extension
 from flexik.positioning.method import Array, checked
 
 STEP = 0.01  # m

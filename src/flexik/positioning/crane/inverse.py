@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexik.mechanisms.crane import CraneGeometry, inverse_with_smallest_extension
+from flexik.kinematics.crane import CraneGeometry, inverse_with_smallest_extension
 from flexik.positioning.ingredients import Ingredients
 from flexik.positioning.method import Array, Command, Network, checked, take_network
 

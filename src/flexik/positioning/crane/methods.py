@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from flexik.errors import ParameterError
-from flexik.mechanisms.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry
 from flexik.positioning import combined, direct, modular, none
 from flexik.positioning.crane import inverse
 from flexik.positioning.ingredients import Ingredients

@@ -7,7 +7,7 @@ from flexik.datasets.crane.provenance import network_checksum
 from flexik.errors import ParameterError
 from flexik.learning import perceptron
 from flexik.learning.storage import load_network
-from flexik.mechanisms.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry
 from flexik.positioning.crane.assembly import crane_method, uncompensated
 from flexik.positioning.method import Method
 

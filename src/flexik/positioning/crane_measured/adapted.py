@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from flexik.errors import ParameterError
-from flexik.mechanisms.crane import CraneGeometry, forward
-from flexik.mechanisms.crane_dimensions import DIMENSIONS, LENGTHS, corrected
+from flexik.kinematics.crane import CraneGeometry, forward
+from flexik.kinematics.crane_dimensions import DIMENSIONS, LENGTHS, corrected
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning.combined import Combined
 from flexik.positioning.crane.closed_form import closed_form

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexik.mechanisms.crane import CranePose, pose, rotate
+from flexik.kinematics.crane import CranePose, pose, rotate
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning.method import Array
 

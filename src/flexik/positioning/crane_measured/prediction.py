@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexik.mechanisms.crane import forward
-from flexik.mechanisms.crane_dimensions import DIMENSIONS, corrected
+from flexik.kinematics.crane import forward
+from flexik.kinematics.crane_dimensions import DIMENSIONS, corrected
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning.crane_measured.adapted import (
     OFFSETS,

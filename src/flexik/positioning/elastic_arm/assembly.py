@@ -2,7 +2,7 @@
 
 from flexik import parameters
 from flexik.datasets.elastic_arm.learning import KINDS
-from flexik.mechanisms.elastic_arm import ArmGeometry
+from flexik.kinematics.elastic_arm import ArmGeometry
 from flexik.positioning import combined, none
 from flexik.positioning.elastic_arm.closed_form import closed_form
 from flexik.positioning.elastic_arm.learnt_angles import GaugeNetwork, InverseNetwork

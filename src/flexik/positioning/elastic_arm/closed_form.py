@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from flexik.mechanisms.elastic_arm import ArmGeometry, elbow, inverse, inverse_by_rule
+from flexik.kinematics.elastic_arm import ArmGeometry, elbow, inverse, inverse_by_rule
 from flexik.positioning.method import REACHED, Array, checked
 from flexik.positioning.rigid_inverse import RigidInverse, RigidSolution
 

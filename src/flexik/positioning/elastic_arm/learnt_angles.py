@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexik.mechanisms.elastic_arm import DEFORMATION, ArmGeometry, elbow, inverse_by_rule
+from flexik.kinematics.elastic_arm import DEFORMATION, ArmGeometry, elbow, inverse_by_rule
 from flexik.positioning.method import REACHED, Array, Command, Network, checked
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexik.datasets.fanuc.samples import nearest_on
-from flexik.mechanisms.fanuc import admissible, inverse
-from flexik.mechanisms.pose_representation import joints_of, pose_inputs
-from flexik.mechanisms.serial_arm import Array, Pose, SerialArm, refine
+from flexik.kinematics.fanuc import admissible, inverse
+from flexik.kinematics.pose_representation import joints_of, pose_inputs
+from flexik.kinematics.serial_arm import Array, Pose, SerialArm, refine
 from flexik.positioning.method import Network, PositioningError
 
 JointMethod = Callable[[Pose, NDArray[np.int64]], Array]
@@ -98,7 +98,7 @@ def workspace_networks(arm: SerialArm, networks: Mapping[int, Network]) -> Joint
 def refined(
     arm: SerialArm, method: JointMethod, n_steps: int, damping: float, orientation_length: float
 ) -> JointMethod:
-    """`method` and damped Newton steps after it, see mechanisms.serial_arm.refine."""
+    """`method` and damped Newton steps after it, see kinematics.serial_arm.refine."""
 
     def steps(target: Pose, number: NDArray[np.int64]) -> Array:
         joints = method(target, number)

@@ -6,7 +6,7 @@ from flexik import parameters
 from flexik.datasets.fanuc.tables import network_checksum, workspace_network_checksum
 from flexik.learning.perceptron import Network
 from flexik.learning.storage import load_network
-from flexik.mechanisms.fanuc import N_CONFIGURATIONS
+from flexik.kinematics.fanuc import N_CONFIGURATIONS
 
 ALL_JOINTS = tuple(range(1, 7))
 

@@ -11,9 +11,9 @@ from flexik.datasets.fanuc.tables import joints_of_rows
 from flexik.learning.perceptron import Network, Quantity
 from flexik.learning.stopping import Stopping
 from flexik.learning.training import Architecture, TrainingRecord, train
-from flexik.mechanisms.fanuc import canonical
-from flexik.mechanisms.pose_representation import INPUTS, OUTPUTS, joint_outputs, pose_inputs
-from flexik.mechanisms.serial_arm import Array, SerialArm, forward
+from flexik.kinematics.fanuc import canonical
+from flexik.kinematics.pose_representation import INPUTS, OUTPUTS, joint_outputs, pose_inputs
+from flexik.kinematics.serial_arm import Array, SerialArm, forward
 
 POSITION = tuple(Quantity(name, "m") for name in ("x", "y", "z"))
 

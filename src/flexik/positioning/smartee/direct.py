@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from flexik.datasets.smartee.poses import inputs_of
 from flexik.errors import ParameterError
 from flexik.learning.perceptron import Network
-from flexik.mechanisms.smartee import SmartEEGeometry, inverse
-from flexik.mechanisms.smartee_newton import newton_steps, solve_elbows
-from flexik.mechanisms.status import REACHED
+from flexik.kinematics.smartee import SmartEEGeometry, inverse
+from flexik.kinematics.smartee_newton import newton_steps, solve_elbows
+from flexik.kinematics.status import REACHED
 from flexik.parameters import SmartEEWorkspace
 
 Array = NDArray[np.float64]

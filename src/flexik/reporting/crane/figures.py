@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
 from flexik.errors import DataError
-from flexik.mechanisms.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry
 from flexik.reporting import style
 from flexik.reporting.crane.schematic import COLOUR, draw_links
 from flexik.reporting.style import MM

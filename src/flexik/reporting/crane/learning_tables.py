@@ -7,7 +7,7 @@ import pandas as pd
 from flexik.datasets.crane.grid import kept
 from flexik.datasets.crane.learning import KINDS, learnt_rows
 from flexik.learning.size_rules import haykin, haykin_samples, oja
-from flexik.mechanisms.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry
 from flexik.reporting import tables
 from flexik.reporting.crane.results import Results
 

@@ -9,7 +9,7 @@ from flexik.datasets.crane.grid import counts, kept
 from flexik.datasets.crane.learning import correction, on_line
 from flexik.evaluation.errors import STATISTICS, comparison, workspace_statistics
 from flexik.files import file_checksum, write_json
-from flexik.mechanisms.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry
 from flexik.multibody.crane.assembly import flexible_crane
 from flexik.parameters import ModularNetwork
 from flexik.positioning.crane.initial import initial_positions

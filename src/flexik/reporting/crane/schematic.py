@@ -12,7 +12,7 @@ from matplotlib.patches import Circle, Polygon
 from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
-from flexik.mechanisms.crane import CraneGeometry, pose
+from flexik.kinematics.crane import CraneGeometry, pose
 from flexik.reporting import style
 from flexik.reporting.style import MM
 

@@ -17,7 +17,7 @@ from flexik.datasets.crane_measured.campaign import METHODS
 from flexik.datasets.crane_measured.fields import ADAPTED, MISJUDGED
 from flexik.errors import DataError
 from flexik.evaluation.crane_measured.campaign import KEYS
-from flexik.mechanisms.crane import CraneGeometry, inverse_with_smallest_extension
+from flexik.kinematics.crane import CraneGeometry, inverse_with_smallest_extension
 from flexik.reporting import style
 from flexik.reporting.crane.schematic import COLOUR, draw_links
 from flexik.reporting.style import MM

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from flexik.evaluation.crane_measured.statistics import budget_statistics, worse_shares
-from flexik.mechanisms.crane import inverse_with_smallest_extension, pose
+from flexik.kinematics.crane import inverse_with_smallest_extension, pose
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning.crane_measured.joint_play import joint_forces
 from flexik.reporting.style import MM

@@ -15,7 +15,7 @@ from flexik.evaluation.crane_measured.campaign import (
     split_campaign,
 )
 from flexik.evaluation.crane_measured.statistics import adaptation_statistics, budget_statistics
-from flexik.mechanisms.crane import inverse_with_smallest_extension
+from flexik.kinematics.crane import inverse_with_smallest_extension
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning.crane_measured.joint_play import joint_forces
 from flexik.reporting import page, style, tables

@@ -13,7 +13,7 @@ from flexik.datasets.elastic_arm.learning import KINDS
 from flexik.datasets.elastic_arm.readings import TRAINING, gauges_of
 from flexik.evaluation.errors import workspace_statistics
 from flexik.learning.size_selection import layer_columns
-from flexik.mechanisms.elastic_arm import DEFORMATION
+from flexik.kinematics.elastic_arm import DEFORMATION
 from flexik.reporting import tables
 from flexik.reporting.elastic_arm.results import NEAR, Results
 from flexik.reporting.elastic_arm.sensitivity import sensitivity_table

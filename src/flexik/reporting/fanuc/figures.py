@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from flexik.datasets.fanuc.tables import COMMANDED, JOINTS, joints_of_rows
-from flexik.mechanisms.serial_arm import frames
+from flexik.kinematics.serial_arm import frames
 from flexik.reporting import style
 from flexik.reporting.fanuc import notes, tables
 from flexik.reporting.fanuc.results import EXACT, LOOKED_UP, WHOLE, Results

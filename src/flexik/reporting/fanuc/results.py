@@ -9,7 +9,7 @@ import pandas as pd
 from flexik import parameters
 from flexik.datasets.fanuc.tables import COMMANDED, JOINTS, joints_of_rows
 from flexik.evaluation.fanuc.errors import statistics
-from flexik.mechanisms.serial_arm import Array, SerialArm
+from flexik.kinematics.serial_arm import Array, SerialArm
 from flexik.positioning.fanuc.training import percent
 
 PUBLISHED_NETWORKS = ("config1", "config2")

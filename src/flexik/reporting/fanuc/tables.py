@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from flexik.evaluation.fanuc.errors import statistics, within
-from flexik.mechanisms.fanuc import ELBOW, N_CONFIGURATIONS, SHOULDER, WRIST
+from flexik.kinematics.fanuc import ELBOW, N_CONFIGURATIONS, SHOULDER, WRIST
 from flexik.reporting.fanuc import notes
 from flexik.reporting.fanuc.notes import DEGREES, NAMES, PASS_ERRORS, SINGULAR_EDGES
 from flexik.reporting.fanuc.results import (

@@ -4,7 +4,7 @@ import numpy as np
 
 from flexik.datasets.smartee.poses import path_name
 from flexik.evaluation.smartee.errors import CORNERS, OUTSIDE
-from flexik.mechanisms.smartee_newton import (
+from flexik.kinematics.smartee_newton import (
     CONVERGED,
     NOT_CONVERGED,
     OTHER_BRANCH,

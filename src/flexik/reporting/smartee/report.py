@@ -10,8 +10,8 @@ from flexik.datasets.smartee.poses import geometry_of, path_name
 from flexik.evaluation.smartee.errors import CORNERS, OUTSIDE
 from flexik.files import write_json
 from flexik.learning.starts import by_trainer
-from flexik.mechanisms.smartee import inverse, rotation_zyz
-from flexik.mechanisms.smartee_newton import CONVERGED
+from flexik.kinematics.smartee import inverse, rotation_zyz
+from flexik.kinematics.smartee_newton import CONVERGED
 from flexik.parameters import parameters_checksum
 from flexik.parameters.smartee import BEST, CENTRE, PREVIOUS, PUBLISHED, RANDOM, VALIDATION
 from flexik.reporting import page

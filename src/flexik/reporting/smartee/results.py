@@ -10,7 +10,7 @@ from flexik import parameters
 from flexik.datasets.smartee.poses import POSE_FIELDS, geometry_of, joints_in, values
 from flexik.errors import DataError
 from flexik.evaluation.smartee.errors import ERRORS
-from flexik.mechanisms.smartee import (
+from flexik.kinematics.smartee import (
     SmartEEGeometry,
     closure_jacobian,
     elbow_circles,
@@ -19,8 +19,8 @@ from flexik.mechanisms.smartee import (
     leg_tips,
     rotation_zyz,
 )
-from flexik.mechanisms.smartee_newton import CONVERGED
-from flexik.mechanisms.status import REACHED
+from flexik.kinematics.smartee_newton import CONVERGED
+from flexik.kinematics.status import REACHED
 from flexik.parameters.smartee import PUBLISHED, OtherGeometry
 from flexik.reporting.style import require
 

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from flexik.mechanisms.smartee import (
+from flexik.kinematics.smartee import (
     N_LEGS,
     SmartEEGeometry,
     base_points,

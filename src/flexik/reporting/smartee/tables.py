@@ -7,7 +7,7 @@ import pandas as pd
 
 from flexik.datasets.smartee.poses import path_name
 from flexik.evaluation.smartee.errors import CORNERS, OUTSIDE
-from flexik.mechanisms.smartee_newton import CONVERGED
+from flexik.kinematics.smartee_newton import CONVERGED
 from flexik.parameters.smartee import BEST, CENTRE, PREVIOUS, PUBLISHED, RANDOM, VALIDATION
 from flexik.reporting.smartee import notes, start_study
 from flexik.reporting.smartee.draws import draw_notes, draws

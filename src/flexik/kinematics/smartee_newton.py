@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.mechanisms.smartee import (
+from flexik.kinematics.smartee import (
     Array,
     ElbowCircles,
     SmartEEGeometry,

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform
 
 from flexik.errors import ParameterError
-from flexik.mechanisms.fanuc import (
+from flexik.kinematics.fanuc import (
     ELBOW,
     N_CONFIGURATIONS,
     SHOULDER,
@@ -24,8 +24,8 @@ from flexik.mechanisms.fanuc import (
     reach,
     wrapped,
 )
-from flexik.mechanisms.serial_arm import Pose, forward, jacobian, pose_errors
-from flexik.mechanisms.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
+from flexik.kinematics.serial_arm import Pose, forward, jacobian, pose_errors
+from flexik.kinematics.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
 
 N_ROUND_TRIP = 100_000
 

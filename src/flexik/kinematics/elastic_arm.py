@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.mechanisms.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
+from flexik.kinematics.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
 
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -45,7 +45,7 @@ class ArmGeometry:
 
 
 class InverseSolution(NamedTuple):
-    """Joint angles (n, 2) in rad and a status (n,), see mechanisms.status.
+    """Joint angles (n, 2) in rad and a status (n,), see kinematics.status.
 
     Rows with OUT_OF_REACH hold NaN; rows with ACTUATOR_LIMIT the angles that would be needed.
     """

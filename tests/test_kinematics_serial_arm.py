@@ -6,7 +6,7 @@ from fanuc_arm import ARM, LIMITS, random_joints
 from scipy.spatial.transform import Rotation
 
 from flexik.errors import ParameterError
-from flexik.mechanisms.serial_arm import (
+from flexik.kinematics.serial_arm import (
     Pose,
     SerialArm,
     forward,

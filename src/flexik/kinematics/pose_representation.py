@@ -7,8 +7,8 @@ singular. What is learnt instead is continuous over all of one arm configuration
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.mechanisms.fanuc import SHOULDER, WRIST, configuration, wrapped
-from flexik.mechanisms.serial_arm import Array, Pose, SerialArm, frames
+from flexik.kinematics.fanuc import SHOULDER, WRIST, configuration, wrapped
+from flexik.kinematics.serial_arm import Array, Pose, SerialArm, frames
 
 # Name and unit of each column
 INPUTS = (

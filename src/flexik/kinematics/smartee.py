@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexik.errors import ParameterError
-from flexik.mechanisms.status import OUT_OF_REACH, REACHED
+from flexik.kinematics.status import OUT_OF_REACH, REACHED
 
 Array = NDArray[np.float64]
 

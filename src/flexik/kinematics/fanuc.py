@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexik.errors import ParameterError
-from flexik.mechanisms.serial_arm import Array, Pose, SerialArm, frames
-from flexik.mechanisms.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
+from flexik.kinematics.serial_arm import Array, Pose, SerialArm, frames
+from flexik.kinematics.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
 
 # Configuration number: 4 if the arm reaches back over axis 1, 2 if the elbow angle is negative, 1
 # if joint 5 is negative (the wrist flipped)
@@ -36,7 +36,7 @@ class InverseSolution(NamedTuple):
 
     joints : (n, 8, 6) in rad; nan where OUT_OF_REACH, the angles that would be needed where
         ACTUATOR_LIMIT
-    status : (n, 8), a code of mechanisms.status
+    status : (n, 8), a code of kinematics.status
     singular : (n, 8), the arm is as good as singular there: wrist centre on axis 1, arm stretched
         or folded, or axes 4 and 6 in line; where joint 1 or 4 is free, its theta is 0
     """

@@ -5,15 +5,15 @@ import dataclasses
 import numpy as np
 from fanuc_arm import ARM, random_joints
 
-from flexik.mechanisms.fanuc import canonical, configuration, inverse
-from flexik.mechanisms.pose_representation import (
+from flexik.kinematics.fanuc import canonical, configuration, inverse
+from flexik.kinematics.pose_representation import (
     INPUTS,
     OUTPUTS,
     joint_outputs,
     joints_of,
     pose_inputs,
 )
-from flexik.mechanisms.serial_arm import forward, pose_errors
+from flexik.kinematics.serial_arm import forward, pose_errors
 
 
 def test_joints_come_back_from_what_is_learnt():

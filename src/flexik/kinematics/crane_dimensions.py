@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from flexik.mechanisms.crane import Array, CraneGeometry
+from flexik.kinematics.crane import Array, CraneGeometry
 
 VECTORS = (
     *("lift_pivot", "lift_cylinder_base", "lift_cylinder_head", "jib_pivot"),

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flexik.errors import ParameterError
-from flexik.mechanisms.smartee import (
+from flexik.kinematics.smartee import (
     SmartEEGeometry,
     closure,
     closure_jacobian,
@@ -17,7 +17,7 @@ from flexik.mechanisms.smartee import (
     leg_tips,
     rotation_zyz,
 )
-from flexik.mechanisms.smartee_newton import (
+from flexik.kinematics.smartee_newton import (
     CONVERGED,
     NOT_CONVERGED,
     OTHER_BRANCH,
@@ -28,7 +28,7 @@ from flexik.mechanisms.smartee_newton import (
     solve_elbows,
     wrapped,
 )
-from flexik.mechanisms.status import OUT_OF_REACH, REACHED
+from flexik.kinematics.status import OUT_OF_REACH, REACHED
 
 GEOMETRY = SmartEEGeometry(0.066, 0.114, 0.055, 0.05)
 HALF = np.array([0.0135, 0.01, 0.0075, *[np.radians(10.0)] * 3])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flexik.mechanisms.elastic_arm import (
+from flexik.kinematics.elastic_arm import (
     ArmGeometry,
     elbow,
     flexible_forward,
@@ -13,7 +13,7 @@ from flexik.mechanisms.elastic_arm import (
     inverse,
     inverse_by_rule,
 )
-from flexik.mechanisms.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
+from flexik.kinematics.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
 
 LENGTHS = (0.57, 0.62)
 LIMITS = np.radians([[-10.0, 45.0], [-45.0, 70.0]]).tolist()

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flexik.mechanisms.crane import (
+from flexik.kinematics.crane import (
     forward,
     inverse,
     inverse_with_smallest_extension,
     pose,
     smallest_extension,
 )
-from flexik.mechanisms.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED, STATUS_MEANING
+from flexik.kinematics.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED, STATUS_MEANING
 
 LIFT_PIVOT = np.array([-0.09, 1.115])
 LIFT_ARM = np.hypot(2.88, 0.024)  # |BG|

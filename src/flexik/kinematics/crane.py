@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexik.errors import ParameterError
-from flexik.mechanisms.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
+from flexik.kinematics.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float]
