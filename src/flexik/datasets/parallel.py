@@ -8,6 +8,7 @@ import contextlib
 import os
 import re
 import sys
+import time
 import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import CancelledError
@@ -29,6 +30,8 @@ _ADDRESS = re.compile(r"[a-z]+://\S+:\d+")
 # Items handed to joblib at once, per worker: joblib keeps results until they are fetched, so this
 # bounds memory. The workers idle for about half an item at the end of each batch.
 BATCH_PER_WORKER = 64
+# To start processes takes this long, s: what is done sooner is done without them
+START_SECONDS = 1.5
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,7 @@ def parallel_map(
     Parameters
     ----------
     function
-        Called in other processes, unless there is one worker of this machine.
+        Called in other processes, unless all is done sooner than they would start.
     items
         Indexed when needed, so a lazy sequence costs no memory.
     settings
@@ -127,11 +130,30 @@ def _evaluate_all(
 ) -> Generator[tuple[int, R], None, None]:
     if len(indices) == 0:
         return
+    with _progress_bar(len(indices), description) as bar:
+        if settings.scheduler is None:
+            started, n = time.perf_counter(), len(indices)
+            for done, i in enumerate(indices, 1):
+                yield _evaluate(function, i, items[i])
+                bar.update()
+                seconds = time.perf_counter() - started
+                if seconds * (n / done - 1.0) > START_SECONDS:
+                    break
+            indices = indices[done:]
+        if len(indices):
+            yield from _in_processes(function, items, indices, settings, bar, return_as)
+
+
+def _in_processes(
+    function: Callable[[T], R],
+    items: Sequence[T],
+    indices: Sequence[int],
+    settings: ParallelSettings,
+    bar: Any,
+    return_as: str,
+) -> Generator[tuple[int, R], None, None]:
     task = joblib.delayed(_evaluate)
-    with (
-        _pool(settings, return_as) as (parallel, n_workers),
-        _progress_bar(len(indices), description) as bar,
-    ):
+    with _pool(settings, return_as, len(indices)) as (parallel, n_workers):
         step = BATCH_PER_WORKER * n_workers
         for start in range(0, len(indices), step):
             batch = indices[start : start + step]
@@ -170,8 +192,10 @@ def _progress_bar(total: int, description: str) -> Any:
 
 
 @contextlib.contextmanager
-def _pool(settings: ParallelSettings, return_as: str) -> Iterator[tuple[joblib.Parallel, int]]:
-    """Yield a joblib pool and its number of workers."""
+def _pool(
+    settings: ParallelSettings, return_as: str, n_items: int
+) -> Iterator[tuple[joblib.Parallel, int]]:
+    """Yield a joblib pool and its number of workers, no more than there are items."""
     options = {"return_as": return_as, "batch_size": 1, "max_nbytes": None}
     if settings.scheduler is not None:
         with _dask_client(settings.scheduler) as client:
@@ -183,7 +207,7 @@ def _pool(settings: ParallelSettings, return_as: str) -> Iterator[tuple[joblib.P
                 raise FlexikError(f"lost the Dask scheduler {settings.scheduler!r}") from error
         return
     # joblib's count respects affinity and the quota of a container
-    n_workers = settings.n_workers or joblib.cpu_count()
+    n_workers = min(settings.n_workers or joblib.cpu_count(), n_items)
     with joblib.parallel_config("loky", n_jobs=n_workers, inner_max_num_threads=1):
         parallel = joblib.Parallel(**options)
     try:

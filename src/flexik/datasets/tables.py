@@ -1,11 +1,11 @@
-"""Parquet tables whose columns carry units, and whose schema names the parameters that made them.
+"""Parquet tables whose columns carry units.
 
-A table is read back only if its columns, types, units and parameters are the expected ones and
-the checksum of every page holds. The bytes depend on the data alone, for one version of pyarrow.
+A table is read back only if its columns, types and units are the expected ones and the checksum of
+every page holds. The bytes depend on the data alone, for one version of pyarrow.
 """
 
 import contextlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,75 +41,45 @@ class Field:
 
 
 def write_table(
-    path: Path | str,
-    columns: Mapping[str, np.ndarray],
-    fields: Sequence[Field],
-    parameters_checksum: str,
-    metadata: Mapping[str, str] | None = None,
+    path: Path | str, columns: Mapping[str, np.ndarray], fields: Sequence[Field]
 ) -> None:
-    """Write `columns` to `path`, whole or not at all.
+    """Write `columns`, an array (n_rows,) of the right type for every field, whole or not at all.
 
-    Parameters
-    ----------
-    path
-        Parquet file to write; its folder is made if needed.
-    columns
-        One array of shape (n_rows,) and of the field's own type for every field.
-    fields
-        The columns, in the order of the file.
-    parameters_checksum
-        Checksum of the parameters the data depend on.
-    metadata
-        Further texts to keep in the schema.
-
-    Raises
-    ------
-    DataError
-        If the columns are not exactly the fields, or differ in length, shape or type.
+    Raises DataError if the columns are not exactly the fields, or differ in length, shape or type.
     """
-    schema = _schema(path, fields, parameters_checksum, metadata or {})
     _compare_names(path, list(columns), fields)
     arrays = [_arrow_array(path, field, columns[field.name]) for field in fields]
     lengths = {field.name: len(array) for field, array in zip(fields, arrays, strict=True)}
     if len(set(lengths.values())) > 1:
         raise DataError(f"{path}: expected columns of equal length, got {lengths}")
-    _write_rows(path, schema, [pa.Table.from_arrays(arrays, schema=schema)])
+    table = pa.Table.from_arrays(arrays, schema=_schema(fields))
+    with (
+        atomic_path(path) as temporary,
+        pq.ParquetWriter(
+            temporary, table.schema, compression="zstd", write_page_checksum=True
+        ) as writer,
+    ):
+        writer.write_table(table, row_group_size=ROWS_PER_GROUP)
 
 
-def read_table(
-    path: Path | str, fields: Sequence[Field], parameters_checksum: str | None = None
-) -> pd.DataFrame:
-    """Table of `path`, columns in the order of `fields`.
+def read_table(path: Path | str, fields: Sequence[Field] | None = None) -> pd.DataFrame:
+    """Table of `path`, columns in the order of `fields` (None: those it has, in its order).
 
     Raises
     ------
     DataError
-        If the file is missing or damaged, has other columns, types or units than `fields`, or,
-        when `parameters_checksum` is given, was made with other parameters.
+        If the file is missing or damaged, or has other columns, types or units than `fields`.
     """
-    return read_arrow(path, fields, parameters_checksum).to_pandas()
-
-
-def read_arrow(
-    path: Path | str, fields: Sequence[Field], parameters_checksum: str | None = None
-) -> pa.Table:
-    """As `read_table`, but an Arrow table (the other modules of this room read it)."""
     with _open(path) as file:
-        _compare_schema(path, file.schema_arrow, fields, parameters_checksum)
+        schema, texts = file.schema_arrow, _texts(file.schema_arrow.metadata)
+        if (version := texts.get("format_version")) != FORMAT_VERSION:
+            raise DataError(f"{path}: expected a table of format {FORMAT_VERSION}, got {version}")
+        if fields is not None:
+            _compare_schema(path, schema, fields)
         _check_counts(path, file.metadata)
-        return file.read().select([field.name for field in fields])
-
-
-def table_metadata(path: Path | str) -> dict[str, str]:
-    """Texts kept in the schema of `path`: `parameters_checksum`, `format_version`, the caller's.
-
-    Raises
-    ------
-    DataError
-        If the file is missing or damaged.
-    """
-    with _open(path) as file:
-        return _texts(file.schema_arrow.metadata)
+        table = file.read()
+    names = schema.names if fields is None else [field.name for field in fields]
+    return table.select(names).to_pandas()
 
 
 def stored_fields(path: Path | str) -> list[Field]:
@@ -133,33 +103,7 @@ def stored_fields(path: Path | str) -> list[Field]:
     return fields
 
 
-def concatenate_tables(
-    parts: Iterable[Path | str],
-    path: Path | str,
-    fields: Sequence[Field],
-    parameters_checksum: str,
-    metadata: Mapping[str, str] | None = None,
-) -> None:
-    """Write the rows of `parts`, in order, to `path`, with one part in memory at a time.
-
-    The bytes are those `write_table` would write for all rows, however they are cut into parts.
-
-    Raises
-    ------
-    DataError
-        If a part cannot be read with these fields and this checksum; `path` is then untouched.
-    """
-    schema = _schema(path, fields, parameters_checksum, metadata or {})
-    tables = (read_arrow(part, fields, parameters_checksum) for part in parts)
-    _write_rows(path, schema, (table.cast(schema) for table in tables))
-
-
-def _schema(
-    path: Path | str, fields: Sequence[Field], checksum: str, metadata: Mapping[str, str]
-) -> pa.Schema:
-    own = {"format_version": FORMAT_VERSION, "parameters_checksum": checksum}
-    if taken := own.keys() & metadata.keys():
-        raise DataError(f"{path}: metadata must not contain the reserved keys {sorted(taken)}")
+def _schema(fields: Sequence[Field]) -> pa.Schema:
     columns = [
         pa.field(
             field.name,
@@ -169,7 +113,7 @@ def _schema(
         )
         for field in fields
     ]
-    return pa.schema(columns, metadata=dict(sorted({**metadata, **own}.items())))
+    return pa.schema(columns, metadata={"format_version": FORMAT_VERSION})
 
 
 def _arrow_array(path: Path | str, field: Field, values: np.ndarray) -> pa.Array:
@@ -185,26 +129,6 @@ def _arrow_array(path: Path | str, field: Field, values: np.ndarray) -> pa.Array
         raise DataError(f"{path}, column {field.name}: expected {field.dtype}, got {values.dtype}")
     # NaN stays NaN: a null would need another meaning
     return pa.array(values, type=_TYPES[field.dtype], from_pandas=False)
-
-
-def _write_rows(path: Path | str, schema: pa.Schema, tables: Iterable[pa.Table]) -> None:
-    """Write tables of `schema` one after the other, in row groups of a fixed length."""
-    with (
-        atomic_path(path) as temporary,
-        pq.ParquetWriter(temporary, schema, compression="zstd", write_page_checksum=True) as writer,
-    ):
-        pending, n_pending = [schema.empty_table()], 0
-        for table in tables:
-            pending.append(table)
-            n_pending += table.num_rows
-            if n_pending >= ROWS_PER_GROUP:
-                rows = pa.concat_tables(pending).combine_chunks()
-                n_whole = n_pending // ROWS_PER_GROUP * ROWS_PER_GROUP
-                writer.write_table(rows.slice(0, n_whole), row_group_size=ROWS_PER_GROUP)
-                pending, n_pending = [rows.slice(n_whole)], n_pending - n_whole
-        if n_pending:
-            rows = pa.concat_tables(pending).combine_chunks()
-            writer.write_table(rows, row_group_size=ROWS_PER_GROUP)
 
 
 def read_csv(
@@ -267,12 +191,7 @@ def _compare_names(path: Path | str, names: Sequence[str], fields: Sequence[Fiel
         raise DataError(f"{path}: expected columns {expected}, each once, got {list(names)}")
 
 
-def _compare_schema(
-    path: Path | str, schema: pa.Schema, fields: Sequence[Field], checksum: str | None
-) -> None:
-    found = _texts(schema.metadata)
-    if (version := found.get("format_version")) != FORMAT_VERSION:
-        raise DataError(f"{path}: expected a table of format {FORMAT_VERSION}, got {version}")
+def _compare_schema(path: Path | str, schema: pa.Schema, fields: Sequence[Field]) -> None:
     _compare_names(path, schema.names, fields)
     for field in fields:
         column = schema.field(field.name)
@@ -284,7 +203,3 @@ def _compare_schema(
             raise DataError(
                 f"{path}, column {field.name}: expected unit {field.unit!r}, got {unit!r}"
             )
-    if checksum is not None and (other := found.get("parameters_checksum")) != checksum:
-        raise DataError(
-            f"{path}: made with other parameters (checksum {other}), expected {checksum}"
-        )
