@@ -1,4 +1,4 @@
-"""Test conditions: every point with every payload."""
+"""Conditions: what a method is asked, and from where."""
 
 from dataclasses import dataclass
 
@@ -12,28 +12,41 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Conditions:
-    """Targets (m, 2) in m, payload (m,) in kg, and the index (m,) of each condition's point."""
+    """Rows of a set of conditions.
 
-    targets: Array
-    payload: Array
-    point_index: NDArray[np.int64]
+    query : (m, p), see positioning.method.
+    current : (m, k) actuator coordinates before the method is asked.
+    group : (m,) number of the point, path or pose that a row belongs to.
+    """
+
+    query: Array
+    current: Array
+    group: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        lengths = {len(self.query), len(self.current), len(self.group)}
+        if len(lengths) != 1 or self.query.ndim != 2 or self.current.ndim != 2:
+            raise ParameterError(
+                f"{self.query.shape=}, {self.current.shape=}, {self.group.shape=}, "
+                "expected (m, p), (m, k) and (m,)"
+            )
 
     def __len__(self) -> int:
-        return len(self.targets)
+        return len(self.query)
 
-    def __getitem__(self, rows: slice) -> "Conditions":
-        return Conditions(self.targets[rows], self.payload[rows], self.point_index[rows])
+    def __getitem__(self, rows: slice | NDArray) -> "Conditions":
+        return Conditions(self.query[rows], self.current[rows], self.group[rows])
+
+    def chunks(self, n_rows: int) -> list["Conditions"]:
+        """In order, in pieces of `n_rows` rows."""
+        return [self[k : k + n_rows] for k in range(0, len(self), n_rows)]
 
 
-def all_conditions(points: ArrayLike, payloads: ArrayLike) -> Conditions:
-    """All of `points` (k, 2) in m with all of `payloads` (p,) in kg, m = k p.
+def every(points: ArrayLike, payloads: ArrayLike) -> tuple[Array, NDArray[np.int64]]:
+    """Queries (m, 3) of all `points` (k, 2) in m with all `payloads` (p,) in kg, m = k p.
 
-    Point-major: all payloads of the first point come first.
-
-    Raises
-    ------
-    ParameterError
-        If points or payloads are empty, of another shape, or not finite.
+    Point-major: all payloads of the first point come first. The second array (m,) numbers the
+    points. Raises ParameterError if either is empty, of another shape, or not finite.
     """
     points, payloads = np.asarray(points, dtype=float), np.asarray(payloads, dtype=float)
     if points.ndim != 2 or points.shape[1:] != (2,) or payloads.ndim != 1:
@@ -44,16 +57,5 @@ def all_conditions(points: ArrayLike, payloads: ArrayLike) -> Conditions:
         raise ParameterError(f"{points.shape=}, {payloads.shape=}, expected one or more of each")
     if not (np.isfinite(points).all() and np.isfinite(payloads).all()):
         raise ParameterError("points and payloads must be finite")
-    return Conditions(
-        np.repeat(points, len(payloads), axis=0),
-        np.tile(payloads, len(points)),
-        np.repeat(np.arange(len(points)), len(payloads)),
-    )
-
-
-def random_conditions(targets: ArrayLike, payload: ArrayLike) -> Conditions:
-    """Conditions of `targets` (m, 2) in m with `payload` (m,) in kg, each a point of its own."""
-    targets, payload = np.asarray(targets, dtype=float), np.asarray(payload, dtype=float)
-    if targets.shape != (len(payload), 2):
-        raise ParameterError(f"{targets.shape=}, {payload.shape=}, expected (m, 2) and (m,)")
-    return Conditions(targets, payload, np.arange(len(payload)))
+    group = np.repeat(np.arange(len(points)), len(payloads))
+    return np.column_stack([points[group], np.tile(payloads, len(points))]), group

@@ -1,8 +1,11 @@
-"""Codes of what an inverse found, one a row; all mechanisms share them."""
+"""Codes of what a method or an inverse found, one a row; all machines share them."""
 
-REACHED, OUT_OF_REACH, ACTUATOR_LIMIT = 0, 1, 2
+REACHED, OUT_OF_REACH, ACTUATOR_LIMIT, NOT_CONVERGED, SINGULAR, OTHER_BRANCH = range(6)
 STATUS_MEANING = {
     REACHED: "reached",
     OUT_OF_REACH: "farther or nearer than the links allow",
     ACTUATOR_LIMIT: "needs an actuator beyond its limit",
+    NOT_CONVERGED: "search ended above its tolerance",
+    SINGULAR: "search ended where its equations are singular",
+    OTHER_BRANCH: "solved, but on another branch than asked for",
 }

@@ -1,7 +1,7 @@
-"""What every positioning method takes and gives: targets and payloads in, commanded strokes out.
+"""What every method takes and gives: queries and current actuator coordinates in, answers out.
 
-Strokes stand for the actuator coordinates of any mechanism: (n, k), strokes in m or joint angles in
-rad.
+A query is a row of numbers: target and payload of a planar machine (x, y in m, kg), the actuated
+joints of a parallel one, a pose. A case names the columns of both, their units and limits.
 """
 
 from collections.abc import Mapping
@@ -9,17 +9,15 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from flexik.datasets.tables import Field
 from flexik.errors import FlexikError
-from flexik.kinematics import status
+from flexik.kinematics.manipulator import Manipulator
+from flexik.parameters.model import Count, Model, Name
 
 Array = NDArray[np.float64]
-Diagnostics = dict[str, NDArray]
-
-REACHED = status.REACHED
-NOT_CONVERGED = 3
-STATUS_MEANING = {**status.STATUS_MEANING, NOT_CONVERGED: "search ended above its tolerance"}
 
 
 class PositioningError(FlexikError):
@@ -27,36 +25,53 @@ class PositioningError(FlexikError):
 
 
 @dataclass(frozen=True)
-class Command:
-    """Commanded strokes; a row that failed still holds strokes the manipulator can take.
+class Answer:
+    """What a method answers; a row that failed holds what the machine can take, or NaN.
 
-    strokes : (n, k) in m, or joint angles in rad.
-    status : (n,), codes of STATUS_MEANING.
+    values : (n, k) actuator coordinates (strokes in m, angles in rad), or what else is asked for.
+    status : (n,), codes of kinematics.status.
     diagnostics : arrays (n,) by name.
     """
 
-    strokes: Array
+    values: Array
     status: NDArray[np.int64]
-    diagnostics: Diagnostics = field(default_factory=dict)
+    diagnostics: Mapping[str, NDArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         shapes = {"status": self.status.shape}
         shapes |= {name: values.shape for name, values in self.diagnostics.items()}
         for name, shape in shapes.items():
-            if shape != self.strokes.shape[:1]:
-                raise PositioningError(f"{name} of {shape=} beside {self.strokes.shape=}")
+            if shape != self.values.shape[:1]:
+                raise PositioningError(f"{name} of {shape=} beside {self.values.shape=}")
 
 
 class Method(Protocol):
-    """A positioning method."""
+    """A method."""
 
-    def __call__(self, targets: Array, payload: Array, initial_strokes: Array) -> Command:
-        """Strokes for `targets` (n, 2) in m under `payload` (n,) in kg.
+    def __call__(self, query: Array, current: Array) -> Answer:
+        """Answer for every row of `query` (n, p).
 
-        `initial_strokes` (n, k) are the current ones; they choose among the many stroke
-        combinations that reach a target, and stay where a method finds none.
+        `current` (n, k) are the present actuator coordinates; they choose among many solutions, and
+        stay where a method of positioning finds none.
         """
         ...
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Columns of a case's queries and answers, and of the errors its judge finds.
+
+    errors : `error` is among them: what a method is judged by.
+    lower, upper : limits (k,) of the answers.
+    diagnostic_unit : of diagnostics that are no whole numbers.
+    """
+
+    query: tuple[Field, ...]
+    answer: tuple[Field, ...]
+    errors: tuple[Field, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    diagnostic_unit: str = "m"
 
 
 class Network(Protocol):
@@ -67,11 +82,44 @@ class Network(Protocol):
         ...
 
 
-def take_network(networks: Mapping[str, Network], name: str) -> Network:
-    """Network `name` of `networks`; raises PositioningError naming what there is."""
-    if name not in networks:
-        raise PositioningError(f"expected a network {name!r}, got {sorted(networks)}")
-    return networks[name]
+class Settings(Model):
+    """Base of the settings of a method of planar machines; its file adds its own, with defaults.
+
+    A file of this room that has a class `Settings` with a `method` of its own and a function
+    `build(settings, ingredients)` is a method, see positioning.registry.
+
+    network : name of the network it is built from.
+    n_targets : the most random targets it is judged on; None: all.
+    """
+
+    network: Name | None = None
+    n_targets: Count | None = None
+
+
+@dataclass(frozen=True)
+class Ingredients:
+    """What methods are built from; each takes what it needs.
+
+    network : the trained one that the settings name.
+    samples : tables of samples by name, those of `READS` of the method's file.
+    """
+
+    manipulator: Manipulator
+    network: Network | None = None
+    samples: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+
+
+def take_network(ingredients: Ingredients) -> Network:
+    """The network of `ingredients`; raises PositioningError if there is none."""
+    if ingredients.network is None:
+        raise PositioningError("the method needs a network, got none")
+    return ingredients.network
+
+
+def planar(query: Array) -> tuple[Array, Array]:
+    """Targets (n, 2) in m and payload (n,) in kg of the `query` (n, 3) of a planar machine."""
+    query = checked("query", query, None, 3)
+    return query[:, :2], query[:, 2]
 
 
 def checked(name: str, values: ArrayLike, *shape: int | None) -> Array:
