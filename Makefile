@@ -1,8 +1,15 @@
-# Two commands do everything, set-up included: `make repro` and `make test`.
-PYTHON ?= python3.11
+# `make repro` and `make test` do everything, set-up included; `make` lists what else there is.
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+# What pyproject.toml asks for, with the extras named, in the versions of constraints.txt. flexik itself
+# is not installed: a stage runs the src beside it, also in a copy of the project that DVC makes.
+# PyPI's torch for Linux brings CUDA, several GB that nothing here uses; without it:
+# PIP_EXTRA_INDEX_URL=https://download.pytorch.org/whl/cpu make setup
+ASKED = $(BIN)/python -c 'import sys, tomllib; \
+  project = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
+  print(*project["dependencies"], *sum((project["optional-dependencies"][e] for e in sys.argv[1:]), []))'
+INSTALL = @echo "installing the packages of pyproject.toml $(1)"; \
+  $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt $$($(ASKED) $(1))
 
 # one BLAS thread a process: these matrices are small, the processes are what runs in parallel
 export OMP_NUM_THREADS := 1
@@ -11,14 +18,17 @@ export MKL_NUM_THREADS := 1
 export DVC_NO_ANALYTICS := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: repro smoke test lint benchmark benchmark-training benchmark-positioning benchmark-fanuc benchmark-smartee setup clean
+.PHONY: help repro smoke test lint lock benchmark benchmark-training benchmark-positioning benchmark-fanuc benchmark-smartee setup clean
+.NOTPARALLEL:
+
+help: ## this list
+	@sed -nE 's/^([a-z-]+):.*## (.*)/make \1\t\2/p' Makefile | expand -t 28
 
 repro: $(VENV)/.pipeline ## run the pipeline; only what changed is computed
-	$(BIN)/python stages/validate.py --check
 	$(BIN)/dvc repro
 
 smoke: $(VENV)/.pipeline ## the same pipeline on a tiny configuration, in a temporary copy
-	$(BIN)/python profiles/run.py profiles/smoke.yaml
+	PYTHONPATH=src $(BIN)/python profiles/run.py profiles/smoke.yaml
 
 test: $(VENV)/.dev ## all tests
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadgroup
@@ -27,6 +37,13 @@ lint: $(VENV)/.dev ## formatting, lint and types
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+lock: $(VENV)/.pipeline ## after a merge that left conflicts in dvc.lock or reports/: one side, brought up to date
+	git diff --name-only --diff-filter=U -z -- dvc.lock reports | xargs -0r git checkout --ours --
+	$(BIN)/dvc repro
+	git add dvc.lock reports
+
+benchmark benchmark-training benchmark-positioning benchmark-fanuc benchmark-smartee: export PYTHONPATH := src
 
 benchmark: $(VENV)/.dev ## timings of the generation beside other ways; writes reports/benchmarks/
 	$(BIN)/python benchmarks/generate.py
@@ -46,22 +63,27 @@ benchmark-smartee: $(VENV)/.benchmark ## timings of the SmartEE's direct kinemat
 
 setup: $(VENV)/.dev ## everything a developer needs
 
+clean: ## remove the environment and everything DVC can make again
+	rm -rf $(VENV)
+	git clean -fdXq data
+
+# the newest Python that answers and fits (a name on the PATH may be a version manager's empty shell)
 $(VENV)/.python:
-	@command -v $(PYTHON) >/dev/null || { echo "error: $(PYTHON) is not on the PATH; set PYTHON to a Python 3.11"; exit 1; }
-	$(PYTHON) -m venv $(VENV)
-	@touch $@
+	@for python in $(or $(PYTHON),python3.14 python3.13 python3.12 python3.11 python3); do \
+	  if $$python -c 'import ensurepip, sys, venv; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' 2>/dev/null; then \
+	    echo "$$python -m venv $(VENV)"; $$python -m venv --clear $(VENV) && touch $@; exit; \
+	  fi; \
+	done; \
+	echo "error: $(or $(PYTHON),the PATH) has no Python 3.11 to 3.14 with venv; name one with PYTHON=..." >&2; exit 1
 
 $(VENV)/.pipeline: $(VENV)/.python pyproject.toml constraints.txt
-	$(PIP) -e .
+	$(call INSTALL)
 	@touch $@
 
-$(VENV)/.dev: $(VENV)/.pipeline
-	$(PIP) -e '.[dev,dask]'
-	@touch $@
+$(VENV)/.dev: $(VENV)/.python pyproject.toml constraints.txt
+	$(call INSTALL,dev dask)
+	@touch $(VENV)/.pipeline $@
 
 $(VENV)/.benchmark: $(VENV)/.dev
-	$(PIP) -e '.[benchmark]'
+	$(call INSTALL,benchmark)
 	@touch $@
-
-clean: ## remove the environment and everything DVC can make again
-	rm -rf $(VENV) data/crane data/elastic_arm data/fanuc data/smartee
