@@ -1,27 +1,36 @@
-"""Networks: what each learns, how large it is, how it is trained."""
+"""Networks of a case: what each learns, how large it is, how it is trained."""
 
-from typing import Annotated, Literal
+import itertools
+from collections.abc import Mapping
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from flexik.parameters.data import Axis
-from flexik.parameters.model import Count, Model, Name, NotNegative, Seed
-
-Kind = Literal["deflection", "direct", "rigid", "inverse"]
-CORRECTION: Literal["correction"] = "correction"
+from flexik.parameters.model import Count, Model, Name, NotNegative, Positive, Seed
 
 
-class Learner(Model):
-    """What every network has; `trainer` is a name under trainers."""
+class Axis(Model):
+    """Evenly spaced values from minimum to maximum."""
 
-    activation: Literal["tanh", "logistic"]
-    n_restarts: Count
-    seed: Seed
-    trainer: Name
+    minimum: float
+    maximum: float
+    increment: Positive
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> Self:
+        steps = (self.maximum - self.minimum) / self.increment
+        if self.maximum < self.minimum or abs(steps - round(steps)) > 1e-6:
+            raise ValueError("increment: maximum - minimum must be a whole number of increments")
+        return self
+
+    @property
+    def n_values(self) -> int:
+        """Number of values."""
+        return round((self.maximum - self.minimum) / self.increment) + 1
 
 
 class Sizes(Axis):
-    """Numbers of hidden neurons."""
+    """Numbers of hidden units of a layer to choose from."""
 
     minimum: Count
     maximum: Count
@@ -33,62 +42,74 @@ class Sizes(Axis):
 
 
 class Select(Model):
-    """Study of sizes, see learning.size_selection."""
+    """Study of sizes: every size from `n_restarts` starts.
 
-    n_hidden: Sizes
+    The smallest size within the share `tolerance` of the least selection error is chosen.
+    """
+
+    n_restarts: Count = 4
+    tolerance: NotNegative = 0.0
+    trainer: Name = "study"
+
+
+Layer = Count | Sizes
+
+
+class Network(Model):
+    """A network; a case says which words `learns` knows.
+
+    n_hidden : units of the hidden layer, or of each of several; where Sizes stand, the selection
+        error chooses among all of them.
+    corrects : name of a network that this one is added to, so that both are one.
+    trainer : a name under trainers.
+    """
+
+    learns: Name | None = None
+    corrects: Name | None = None
+    n_hidden: Layer | Annotated[list[Layer], Field(min_length=1)]
+    select: Select = Select()
+    activation: Literal["tanh", "logistic"] = "tanh"
     n_restarts: Count
-    tolerance: NotNegative
-    trainer: Name
-
-
-class NetworkModel(Learner):
-    """A network of given size."""
-
-    kind: Kind
-    n_hidden: Count
-
-
-class SelectedNetwork(Learner):
-    """A network whose size the selection error chooses."""
-
-    kind: Kind
-    select: Select
-
-
-class ModularNetwork(Learner):
-    """A correction of given size to the network `rigid`, and both joined into one."""
-
-    rigid: Name
-    n_hidden: Count
+    seed: Seed = 1
+    trainer: Name = "accelerated"
 
     @property
-    def kind(self) -> Literal["correction"]:
-        """What is learnt."""
-        return CORRECTION
-
-
-class SelectedModularNetwork(Learner):
-    """The same with a correction whose size the selection error chooses."""
-
-    rigid: Name
-    select: Select
+    def layers(self) -> list[int | Sizes]:
+        """Units of each hidden layer, or those to choose from."""
+        return self.n_hidden if isinstance(self.n_hidden, list) else [self.n_hidden]
 
     @property
-    def kind(self) -> Literal["correction"]:
-        """What is learnt."""
-        return CORRECTION
+    def sizes(self) -> list[tuple[int, ...]]:
+        """Units of all hidden layers; several where one is to be chosen."""
+        choices = (n.values() if isinstance(n, Sizes) else [n] for n in self.layers)
+        return list(itertools.product(*choices))
+
+    @property
+    def is_selected(self) -> bool:
+        """Whether the selection error chooses the size."""
+        return any(isinstance(n, Sizes) for n in self.layers)
 
 
-AnyNetwork = NetworkModel | SelectedNetwork | ModularNetwork | SelectedModularNetwork
-
-
-class Fitting(Model):
-    """Networks of several sizes on a thinned grid, see stages/crane_fitting.py."""
-
-    n_samples: Count
-    n_hidden: Annotated[list[Count], Field(min_length=1)]
-    jib: NotNegative
-    extension: NotNegative
-    payload: NotNegative
-    trainer: Name
-    seed: Seed
+def check_networks(networks: Mapping[str, Network], trainers: Mapping[str, object]) -> None:
+    """Raise ValueError unless trainers and corrected networks that `networks` name are there."""
+    for name, network in networks.items():
+        named = {"trainer": network.trainer}
+        if network.is_selected:
+            named["select.trainer"] = network.select.trainer
+        elif "select" in network.model_fields_set:
+            raise ValueError(f"networks.{name}.select: n_hidden is given, nothing to select")
+        for key, trainer in named.items():
+            if trainer not in trainers:
+                known = ", ".join(trainers)
+                raise ValueError(
+                    f"networks.{name}.{key}: there is no trainer {trainer!r} ({known})"
+                )
+        if (network.learns is None) == (network.corrects is None):
+            raise ValueError(f"networks.{name}.learns: expected either this or corrects")
+        other = networks.get(network.corrects or "")
+        if network.corrects is not None and (other is None or other.corrects is not None):
+            known = ", ".join(n for n, given in networks.items() if given.corrects is None)
+            raise ValueError(
+                f"networks.{name}.corrects: {network.corrects!r} is no network that can be "
+                f"corrected ({known})"
+            )
