@@ -1,49 +1,17 @@
-"""Reading and validating params.yaml."""
+"""Reading YAML files and validating what they hold."""
 
-import json
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any, TypeVar
 
 import yaml
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from flexik.errors import ParameterError
-from flexik.files import checksum
-from flexik.parameters.crane import Crane
-from flexik.parameters.elastic_arm import ElasticArm
-from flexik.parameters.fanuc import Fanuc
-from flexik.parameters.model import Model
-from flexik.parameters.smartee import SmartEE
 
 PARAMETERS_FILE = "params.yaml"
-
-
-class Parallel(Model):
-    """Where the parallel stages compute."""
-
-    n_workers: Annotated[int, Field(ge=0)]
-    scheduler: str | None
-
-
-class Parameters(Model):
-    """The whole of params.yaml."""
-
-    parallel: Parallel
-    crane: Crane
-    fanuc: Fanuc
-    smartee: SmartEE
-    elastic_arm: ElasticArm
-
-
-def load_parameters(path: Path | str = PARAMETERS_FILE) -> Parameters:
-    """Read and validate `path`.
-
-    Raises ParameterError, one line a wrong key, if the file is missing, no YAML, or a value is
-    unknown, missing or out of range.
-    """
-    return validate(read_yaml(path), str(path))
+T = TypeVar("T")
 
 
 def read_yaml(path: Path | str) -> dict[str, Any]:
@@ -64,55 +32,52 @@ def read_yaml(path: Path | str) -> dict[str, Any]:
     return data
 
 
-def validate(data: dict[str, Any], source: str = PARAMETERS_FILE) -> Parameters:
-    """`data` as Parameters; raises ParameterError naming `source` and the wrong keys."""
+def validated(model: type[T], data: Any, source: Callable[[list[str]], tuple[str, str]]) -> T:
+    """`data` as `model`.
+
+    Raises ParameterError, one line a wrong value; `source` tells file and key of its location.
+    """
     try:
-        return Parameters.model_validate(data)
+        return TypeAdapter(model).validate_python(data)
     except ValidationError as error:
         lines = []
         for detail in error.errors():
-            key = ".".join(_without_tags([str(p) for p in detail["loc"]])) or "top level"
+            location = _keys(detail["loc"], data)
             message = detail["msg"].removeprefix("Value error, ")
             if detail["type"] == "value_error":  # our own: "key within the section: what is wrong"
                 within, _, message = message.partition(": ")
-                key = f"{key}.{within}"
+                location += within.split(".")
+            file, key = source(location)
             given = detail["input"]
             shown = f", got {given!r}" if not isinstance(given, dict | list | BaseModel) else ""
-            lines.append(f"{source}: {key}: {message}{shown}")
+            lines.append(f"{file}: {key or 'top level'}: {message}{shown}")
         raise ParameterError("\n".join(lines)) from None
 
 
-def _without_tags(location: list[str]) -> list[str]:
-    """The keys of a location, without the kind pydantic adds where a section has several."""
-    before = ["", "", *location]
-    tags = {
-        k
-        for k in range(len(location))
-        if before[k + 1] == "inversion" or before[k] in ("trainers", "methods")
-    }
-    return [part for k, part in enumerate(location) if k not in tags]
+def _keys(location: Sequence[int | str], data: Any) -> list[str]:
+    """The keys of a location in `data`, without the kinds pydantic adds where there are several."""
+    found = []
+    for number, part in enumerate(location):
+        inside = part in data if isinstance(data, Mapping) else False
+        if isinstance(data, list) and isinstance(part, int):
+            inside = part < len(data)
+        if inside:
+            data = data[part]
+        if inside or number == len(location) - 1:  # a missing key is the last
+            found.append(str(part))
+    return found
 
 
-def overlay(base: dict[str, Any], changes: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    """`base` with the keys of `changes` replaced, mapping by mapping.
-
-    Raises ParameterError for a key that `base` does not have.
-    """
+def overlay(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """`base` with the keys of `changes` put in or replaced, mapping by mapping."""
     result = dict(base)
     for key, value in changes.items():
-        if key not in base:
-            raise ParameterError(f"profile: {prefix}{key} is no key of {PARAMETERS_FILE}")
-        nested = isinstance(value, dict) and isinstance(base[key], dict)
-        result[key] = overlay(base[key], value, f"{prefix}{key}.") if nested else value
+        nested = isinstance(value, Mapping) and isinstance(base.get(key), Mapping)
+        result[key] = overlay(base[key], value) if nested else value
     return result
 
 
-def parameters_checksum(sections: Iterable[BaseModel]) -> str:
-    """SHA-256 of the values of `sections`, the same for equal values."""
-    return checksum(*(json.dumps(s.model_dump(mode="json"), sort_keys=True) for s in sections))
-
-
-class _UniqueKeyLoader(yaml.SafeLoader):
+class _UniqueKeyLoader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
     """Refuses a key that stands twice in a mapping."""
 
 
