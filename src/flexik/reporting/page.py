@@ -1,89 +1,142 @@
-"""Report pages in Markdown."""
+"""Report pages: a Jinja template with the prose, tables and figures by name.
 
-import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+In a template stand sentences with numbers by name; a paragraph may be wrapped. Functions:
+`table("name")`, `{% call table("name") %}caption, then "- notes"{% endcall %}`,
+`figure("name", "caption")`; filters: see FILTERS. An unknown name is an error.
+"""
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
-import pandas as pd
+import jinja2
+import numpy as np
 
 from flexik.errors import DataError
-from flexik.files import write_text
-from flexik.reporting.tables import markdown
+from flexik.reporting import style
+from flexik.reporting.tables import Table
+
+# lines that end a paragraph: lists, tables, headings, figures, markers
+_OWN_LINE = re.compile(r"\s*([-*|#<]|!\[|\d+\. )")
 
 
-@dataclass(frozen=True)
-class Section:
-    """A part of a page: heading, text, then tables, then figures.
+def _unit(scale: float, unit: str) -> Callable[..., str]:
+    def write(value: float, decimals: int = 2) -> str:
+        return f"{scale * value:.{decimals}f} {unit}"
 
-    tables : Markdown files made by tables.write_table, shown whole, with a link to the CSV beside.
-    figures : image files and their captions.
+    return write
+
+
+def _several(values: Iterable[Any], last: str = " and ") -> str:
+    texts = [str(value) for value in values]
+    return last.join(filter(None, [", ".join(texts[:-1]), texts[-1]])) if texts else "none"
+
+
+FILTERS: dict[str, Callable[..., Any]] = {
+    # 0.00178 -> "1.78 mm", and so on, decimals as argument
+    "mm": _unit(style.MM, "mm"),
+    "mrad": _unit(style.MM, "mrad"),
+    "um": _unit(style.MICRO, "um"),
+    "deg": _unit(style.DEGREES, "deg"),
+    "percent": lambda value, decimals=0: f"{100 * value:.{decimals}f} %",
+    "fixed": lambda value, decimals=2: f"{value:.{decimals}f}",
+    "short": lambda value: f"{value:g}",  # 470.0 -> "470"
+    "digits": lambda value, n=3: np.format_float_positional(
+        float(value), n, fractional=False, trim="-"
+    ),
+    "point": lambda point: style.coordinates(*point),  # (1, -2) -> "(1, −2)"
+    "code": lambda name: f"`{name}`",
+    "words": lambda name: str(name).replace("_", " "),
+    "several": _several,  # "a, b and c"
+}
+
+
+@dataclass
+class Page:
+    """Texts rendered from a template, and which tables and figures it showed.
+
+    text : of the page.
+    tables : Markdown by name of the table, caption and notes around it.
+    figures : names in the order of the page.
     """
 
-    title: str
     text: str = ""
-    tables: Sequence[Path | str] = ()
-    figures: Sequence[tuple[Path | str, str]] = ()
+    tables: dict[str, str] = field(default_factory=dict)
+    figures: list[str] = field(default_factory=list)
 
 
-def page(
-    path: Path | str,
-    title: str,
-    sections: Sequence[Section],
-    parameters: Mapping[str, str],
-    inputs: Mapping[str, str],
-) -> None:
-    """Write a report page with relative links and, last, what it was made from.
-
-    Parameters
-    ----------
-    path
-        Markdown file to write.
-    title
-        Heading of the page.
-    sections
-        Its parts, in order.
-    parameters, inputs
-        Checksums by the name of the parameter section and of the input file.
+def render(
+    template: Path | str,
+    tables: Mapping[str, Table],
+    figures: Iterable[str],
+    values: Mapping[str, Any],
+) -> Page:
+    """Fill the file `template` with `values`; links are relative to the page.
 
     Raises
     ------
     DataError
-        If a table or figure is missing.
+        If the template names a value, table or figure that is not given, or leaves one out.
     """
-    path = Path(path)
-    blocks = [f"# {title}"]
-    for section in sections:
-        blocks.append(f"## {section.title}")
-        if section.text:
-            blocks.append(section.text.strip("\n"))
-        blocks += [_table(path, Path(table)) for table in section.tables]
-        blocks += [_figure(path, Path(figure), caption) for figure, caption in section.figures]
-    blocks += ["## Provenance", _checksums("parameters", parameters), _checksums("input", inputs)]
-    write_text(path, "\n\n".join(blocks) + "\n")
+    page, known = Page(), set(figures)
+    path = Path(template)
 
+    def table(name: str, caption: str = "", caller: Callable[[], str] | None = None) -> str:
+        style.require(f"{path}: tables", tables, [name])
+        lines = unwrapped(caller()).strip("\n").splitlines() if caller else []
+        notes = [line.removeprefix("- ") for line in lines if line.startswith("- ")]
+        above = " ".join(line for line in lines if line and not line.startswith("- "))
+        page.tables[name] = tables[name].markdown(above or caption, notes)
+        csv = f"{name}.csv"
+        return f"{page.tables[name]}\n[{Path(csv).name}]({quote(csv)})\n"
 
-def _table(page_path: Path, table: Path) -> str:
+    def figure(name: str, caption: str) -> str:
+        style.require(f"{path}: figures", known, [name])
+        page.figures.append(name)
+        alternative = caption.replace("[", "(").replace("]", ")")
+        return f"![{alternative}]({quote(f'figures/{name}.png')})\n\n*{caption}*\n"
+
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(path.parent),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        autoescape=False,
+    )
+    environment.filters |= FILTERS
+    environment.globals |= {"table": table, "figure": figure, "zip": zip}
     try:
-        text = table.read_text(encoding="utf-8").strip("\n")
-    except OSError as error:
-        raise DataError(f"{page_path}: no table {table}") from error
-    csv = table.with_suffix(".csv")
-    return f"{text}\n\n[{csv.name}]({_link(page_path, csv)})"
+        text = environment.get_template(path.name).render(**values)
+    except jinja2.TemplateError as error:
+        line = getattr(error, "lineno", None) or _line(error, path.name)
+        raise DataError(f"{path}{f', line {line}' if line else ''}: {error}") from error
+    page.text = re.sub(r"\n{3,}", "\n\n", unwrapped(text)).strip("\n") + "\n"
+    if left := sorted((set(tables) - set(page.tables)) | (known - set(page.figures))):
+        raise DataError(f"{path}: nowhere shows {', '.join(left)}")
+    return page
 
 
-def _figure(page_path: Path, figure: Path, caption: str) -> str:
-    alternative = caption.replace("[", "(").replace("]", ")")
-    return f"![{alternative}]({_link(page_path, figure)})\n\n*{caption}*"
+def _line(error: Exception, name: str) -> int | None:
+    """Line of the template `name` where an error was raised."""
+    trace, line = error.__traceback__, None
+    while trace is not None:
+        if Path(trace.tb_frame.f_code.co_filename).name == name:
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return line
 
 
-def _link(page_path: Path, target: Path) -> str:
-    if not target.is_file():
-        raise DataError(f"{page_path}: no file {target}")
-    return quote(Path(os.path.relpath(target, page_path.parent)).as_posix())
-
-
-def _checksums(what: str, checksums: Mapping[str, str]) -> str:
-    rows = [{what: name, "SHA-256": f"`{value}`"} for name, value in sorted(checksums.items())]
-    return markdown(pd.DataFrame(rows, columns=[what, "SHA-256"])).strip("\n")
+def unwrapped(text: str) -> str:
+    """`text` with the lines of each paragraph and list entry joined."""
+    lines: list[str] = []
+    joins = False  # whether the last line takes a further one
+    for line in text.splitlines():
+        if joins and line.strip() and not _OWN_LINE.match(line):
+            lines[-1] += f" {line.strip()}"
+            continue
+        lines.append(line.rstrip())
+        joins = bool(line.strip()) and not re.match(r"\s*([|#<]|!\[)", line)
+    return "\n".join(lines)

@@ -1,27 +1,36 @@
 """One look for all figures, and PNG files whose bytes depend on the data alone."""
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 
 from flexik.errors import DataError
 from flexik.files import atomic_path
 
-MM = 1e3  # millimetres in a metre
+MM = 1e3  # millimetres in a metre, mrad in a rad
+MICRO = 1e6
+DEGREES = 180.0 / np.pi
 WIDTH = 8.0  # inches: 1200 pixels, which GitHub shows at about 900
 
 # Okabe and Ito's palette, told apart with every kind of colour vision
 BLUE, SKY, GREEN = "#0072B2", "#56B4E9", "#009E73"
 ORANGE, VERMILION, PURPLE = "#E69F00", "#D55E00", "#CC79A7"
 INK, GREY, PALE = "#262626", "#8C8C8C", "#D9D9D9"
+COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, INK, GREY)
+DASHES = ("-", "--", ":", "-.")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+
+Look = Mapping[str, Any]  # keywords of Axes.plot: color, linestyle, marker
+
+# the same everywhere: published values, what was chosen
+PUBLISHED: Look = {"color": INK, "linestyle": "--", "linewidth": 1.2}
+CHOSEN: Look = {"color": VERMILION, "linestyle": "-", "linewidth": 1.5}
 
 STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
@@ -32,7 +41,7 @@ STYLE: dict[Any, Any] = {
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlelocation": "left",
-    "axes.titlesize": 10.5,
+    "axes.titlesize": 10,
     "axes.unicode_minus": True,
     "figure.constrained_layout.use": True,
     "figure.dpi": 150,
@@ -61,34 +70,56 @@ def house_style() -> Iterator[None]:
         yield
 
 
-def write_png(path: Path | str, build: Callable[..., Figure], *data: Any) -> None:
-    """Write the figure `build(*data)` to `path` in the house style, whole or not at all.
+def write_png(path: Path | str, build: Callable[..., Figure], *data: Any, **options: Any) -> None:
+    """Write the figure `build(*data, **options)` to `path`, whole or not at all.
 
     The file carries no version of matplotlib and no date.
     """
     with house_style():
-        figure = build(*data)
+        figure = build(*data, **options)
         with atomic_path(path) as temporary:
             FigureCanvasAgg(figure).print_png(str(temporary), metadata={"Software": None})
 
 
-def payload_colours(payloads: Iterable[float]) -> dict[float, tuple[float, ...]]:
-    """Colours of viridis by payload, dark for the lightest."""
-    values = sorted({float(p) for p in payloads})
-    shades = np.linspace(0.0, 0.88, max(len(values), 2))
-    return {p: mpl.colormaps["viridis"](s) for p, s in zip(values, shades, strict=False)}
+def looks(
+    names: Iterable[Any], suffixes: Sequence[str] = (), fixed: Mapping[Any, Look] | None = None
+) -> dict[Any, dict[str, Any]]:
+    """Colour, line and marker by name: one hue a name, the same in every figure of a case.
+
+    Parameters
+    ----------
+    names
+        Methods, networks, trainers of the case, all of them in a fixed order.
+    suffixes
+        A name that ends with one of these has the hue of the name without it; its line and marker
+        are the next of DASHES and MARKERS for each suffix.
+    fixed
+        Looks of some names, which take no colour from the others.
+    """
+    fixed, found = fixed or {}, {}
+    bases: dict[str, int] = {}
+    for name in names:
+        if name in fixed:
+            found[name] = dict(fixed[name])
+            continue
+        variant = next((k for k, s in enumerate(suffixes, 1) if str(name).endswith(s)), 0)
+        base = str(name).removesuffix(suffixes[variant - 1]) if variant else str(name)
+        number = bases.setdefault(base, len(bases))
+        kind = variant + (len(suffixes) + 1) * (number // len(COLOURS))
+        found[name] = {
+            "color": COLOURS[number % len(COLOURS)],
+            "linestyle": DASHES[kind % len(DASHES)],
+            "marker": MARKERS[kind % len(MARKERS)],
+        }
+    return found
 
 
-def plane(axes: Axes) -> None:
-    """Axes of the boom's plane: equal scales, labelled in m."""
-    axes.set_aspect("equal", adjustable="box")
-    axes.set_xlabel("x (m)")
-    axes.set_ylabel("y (m)")
-
-
-def true_minus(axes: Axes) -> None:
-    """Whole or decimal tick labels with a real minus sign, also on logarithmic scales."""
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: signed(value)))
+def shades(values: Iterable[float], colours: str = "viridis") -> dict[Any, dict[str, Any]]:
+    """Looks by an ordered quantity (payload, number of steps), dark for the least."""
+    known = sorted(set(values))
+    tones = np.linspace(0.0, 0.88, max(len(known), 2))
+    palette = mpl.colormaps[colours]
+    return {v: {"color": mpl.colors.to_hex(palette(t))} for v, t in zip(known, tones, strict=False)}
 
 
 def signed(value: float) -> str:
@@ -96,9 +127,9 @@ def signed(value: float) -> str:
     return f"{value + 0.0:g}".replace("-", "\N{MINUS SIGN}")
 
 
-def coordinates(x: float, y: float) -> str:
+def coordinates(*point: float) -> str:
     """Name of a point: its coordinates in m."""
-    return f"({signed(x)}, {signed(y)})"
+    return f"({', '.join(signed(value) for value in point)})"
 
 
 def require(what: str, found: Iterable[object], expected: Iterable[str]) -> None:
@@ -106,10 +137,3 @@ def require(what: str, found: Iterable[object], expected: Iterable[str]) -> None
     present = list(found)
     if missing := [name for name in expected if name not in present]:
         raise DataError(f"{what}: expected {missing} too, found {present}")
-
-
-def finite(what: str, values: Mapping[str, Any]) -> None:
-    """Raise a DataError naming the first entry of `values` that holds something not finite."""
-    for name, numbers in values.items():
-        if not np.isfinite(np.asarray(numbers, dtype=float)).all():
-            raise DataError(f"{what}: {name} is not finite")

@@ -1,4 +1,4 @@
-"""Tables: CSV first, Markdown for people beside it; and the tables of published values beside ours.
+"""Tables: CSV first, Markdown for people beside it.
 
 CSV keeps EXTRA_DECIMALS more than Markdown and no more, so that round-off of another machine does
 not change the file.
@@ -6,13 +6,13 @@ not change the file.
 
 import numbers
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from flexik.errors import DataError
-from flexik.evaluation.errors import comparison
 from flexik.files import write_text
 from flexik.reporting.style import MM, require
 
@@ -21,16 +21,57 @@ Decimals = int | Mapping[str, int]
 DECIMALS = 2
 EXTRA_DECIMALS = 3
 
-# As in the thesis' table of simulated positioning errors
-STATISTIC_NAMES = {
-    "max_abs_dx": "max |dX| (mm)",
-    "max_abs_dy": "max |dY| (mm)",
-    "max_error": "max R (mm)",
-    "mean_abs_dx": "mean |dX| (mm)",
-    "mean_abs_dy": "mean |dY| (mm)",
-    "mean_error": "mean R (mm)",
-}
-COUNT_NAMES = {"n_conditions": "conditions", "n_failed": "failed conditions"}
+
+@dataclass(frozen=True)
+class Table:
+    """A frame of numbers, texts or nothing, and the decimals of its floats in Markdown.
+
+    decimals : for all columns, or by column (DECIMALS for the others).
+    """
+
+    frame: pd.DataFrame
+    decimals: Decimals = DECIMALS
+
+    @property
+    def csv(self) -> str:
+        """Text of the CSV file."""
+        cells = _cells(self.frame, self.decimals, EXTRA_DECIMALS)
+        return cells.to_csv(index=False, lineterminator="\n")
+
+    def markdown(self, caption: str = "", notes: Sequence[str] = ()) -> str:
+        """Caption, rows, notes as a list; see `markdown`."""
+        return markdown(self.frame, self.decimals, caption, notes)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table: from which column of the results, times `scale`."""
+
+    source: str
+    decimals: int = DECIMALS
+    scale: float = 1.0
+
+
+def mm(source: str, decimals: int = DECIMALS) -> Column:
+    """Column in millimetres of one in metres (or mrad of rad)."""
+    return Column(source, decimals, MM)
+
+
+def table(rows: pd.DataFrame | Sequence[Mapping], columns: Mapping[str, str | Column]) -> Table:
+    """Table of some columns of `rows` under the titles that are the keys of `columns`.
+
+    A name stands for a column that is taken as it is. Raises DataError if one is missing.
+    """
+    frame = pd.DataFrame(rows)
+    given = {t: c if isinstance(c, Column) else Column(c) for t, c in columns.items()}
+    if frame.empty:
+        return Table(pd.DataFrame(columns=list(given)), {t: c.decimals for t, c in given.items()})
+    require("rows of the table", frame.columns, [column.source for column in given.values()])
+    found = {
+        title: frame[c.source] if c.scale == 1.0 else c.scale * frame[c.source]
+        for title, c in given.items()
+    }
+    return Table(pd.DataFrame(found), {title: c.decimals for title, c in given.items()})
 
 
 def write_table(
@@ -97,89 +138,6 @@ def markdown(
     if footnotes:
         blocks.append("\n".join(f"- {note}" for note in footnotes))
     return "\n\n".join(blocks) + "\n"
-
-
-def positioning_errors_table(
-    by_method: Mapping[str, Mapping[str, float]],
-    published: pd.DataFrame,
-    column_of: Mapping[str, str | None] | None = None,
-) -> pd.DataFrame:
-    """Six statistics in mm, ours and the published one for every method; then the counts.
-
-    Parameters
-    ----------
-    by_method
-        Results of evaluation.errors.statistics (m) by label.
-    published
-        A column `statistic` and a column (mm) for every published method.
-    column_of
-        Published column of a label where it is not the label itself; None where nothing is
-        published, which leaves the cells empty.
-
-    Returns
-    -------
-    DataFrame
-        Columns statistic, `label` and `label published` for every label; nothing is published
-        about the counts.
-
-    Raises
-    ------
-    DataError
-        If a published statistic or column, or a count, is missing.
-    """
-    errors = comparison(by_method, published, column_of)
-    names = [STATISTIC_NAMES[str(name)] for name in errors.index]
-    columns: dict[str, list[object]] = {"statistic": [*names, *COUNT_NAMES.values()]}
-    for label, values in by_method.items():
-        require(f"statistics of {label}", values, COUNT_NAMES)
-        columns[label] = [*errors[label], *(int(values[count]) for count in COUNT_NAMES)]
-        published_name = f"{label} published"
-        columns[published_name] = [*errors[published_name], *(None for _ in COUNT_NAMES)]
-    return pd.DataFrame(columns, dtype=object)  # integers stay integers beside floats
-
-
-def calibration_table(
-    statistics: Mapping[str, float], published: pd.DataFrame, column: str = "none"
-) -> pd.DataFrame:
-    """Our six `statistics` (m) beside the published `column` (mm), and the difference in %.
-
-    Raises DataError if a published statistic or the column is missing.
-    """
-    errors = comparison({column: statistics}, published)
-    ours, theirs = errors[column], errors[f"{column} published"]
-    return pd.DataFrame(
-        {
-            "statistic": [STATISTIC_NAMES[str(name)] for name in errors.index],
-            "ours": ours.to_numpy(),
-            "published": theirs.to_numpy(),
-            "difference (%)": (100 * (ours / theirs - 1)).to_numpy(),
-        }
-    )
-
-
-def mesh_table(frame: pd.DataFrame) -> pd.DataFrame:
-    """Tip differences of a mesh study in mm.
-
-    Parameters
-    ----------
-    frame
-        A row for every mesh; columns `refinement`, `mean_difference` and `max_difference` (m, of
-        the tip from the finest mesh). Other columns pass through unchanged.
-
-    Raises
-    ------
-    DataError
-        If a column is missing.
-    """
-    names = {
-        "mean_difference": "mean tip difference (mm)",
-        "max_difference": "max tip difference (mm)",
-    }
-    require("mesh study", frame.columns, ("refinement", *names))
-    table = frame.copy()
-    for name in names:
-        table[name] = MM * table[name]
-    return table.rename(columns=names).reset_index(drop=True)
 
 
 def _cells(frame: pd.DataFrame, decimals: Decimals, extra: int) -> pd.DataFrame:

@@ -1,0 +1,180 @@
+"""A report as a whole: tables, figures, metrics and page of a case, written where they changed."""
+
+import hashlib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from flexik.datasets.parallel import ParallelSettings, parallel_map
+from flexik.errors import DataError
+from flexik.files import file_checksum, read_json, write_json, write_text
+from flexik.reporting import style
+from flexik.reporting.page import render
+from flexik.reporting.tables import Table
+
+PROVENANCE = (
+    "\n## Provenance\n\nChecksums of parameters, machine and reference files that this report was "
+    "made from: [provenance.csv](provenance.csv).\n"
+)
+# code that decides how a figure looks, besides the module of its kind
+DRAWING = ("style", "chart", "kinds", "plane")
+FEW = 3  # figures that are drawn sooner than other processes start
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure to draw: `kind(*data, **options)`, a function of some module."""
+
+    kind: Callable[..., Figure]
+    data: tuple[Any, ...]
+    options: Mapping[str, Any]
+
+
+def draw(kind: Callable[..., Figure], *data: Any, **options: Any) -> Drawing:
+    """Figure of `kind` (reporting.chart, kinds, plane, or one of a case), drawn later."""
+    return Drawing(kind, data, options)
+
+
+def write_report(
+    folder: Path,
+    template: Path,
+    *,
+    tables: Mapping[str, Table],
+    figures: Mapping[str, Drawing],
+    metrics: Mapping[str, float | None],
+    values: Mapping[str, Any],
+    files: Mapping[str, str] | None = None,
+    sources: Mapping[str, str] | None = None,
+    record: Path,
+    parallel: ParallelSettings | None = None,
+) -> None:
+    """Write README.md, metrics.json, tables (CSV, Markdown) and figures (PNG) into `folder`.
+
+    Parameters
+    ----------
+    folder
+        Of the report.
+    template
+        Page, see reporting.page; shows all tables and figures.
+    tables, figures
+        By name, which is their path below `folder` (tables) or `folder`/figures, without suffix.
+    metrics
+        For metrics.json.
+    values
+        For the sentences of the template.
+    files
+        Further texts by path below `folder`.
+    sources
+        Checksums by the name of what the report was made from: provenance.csv.
+    record
+        JSON file of what was written and drawn from what. A figure whose data and drawing code are
+        those of the record is not drawn again; a file of the record that is no longer made goes.
+    parallel
+        Where figures are drawn.
+
+    Raises
+    ------
+    DataError
+        See reporting.page.render and the kinds of figures. Nothing is written then but figures.
+    """
+    page = render(template, tables, figures, values)
+    texts = dict(files or {})
+    for name, table in tables.items():
+        texts |= {f"{name}.csv": table.csv, f"{name}.md": page.tables[name]}
+    if sources:
+        rows = pd.DataFrame({"source": list(sources), "SHA-256": list(sources.values())})
+        texts["provenance.csv"] = rows.to_csv(index=False, lineterminator="\n")
+    texts["README.md"] = page.text + (PROVENANCE if sources else "")
+    earlier = read_json(record) if record.is_file() else {"files": [], "figures": {}}
+    drawn = _draw_all(folder, figures, earlier["figures"], parallel or ParallelSettings())
+    for name, text in texts.items():
+        write_text(folder / name, text)
+    write_json(folder / "metrics.json", dict(metrics))
+    made = sorted([*texts, "metrics.json", *(f"figures/{name}.png" for name in figures)])
+    for name in set(earlier["files"]) - set(made):
+        (folder / name).unlink(missing_ok=True)
+    write_json(record, {"files": made, "figures": drawn})
+
+
+def _draw_all(
+    folder: Path,
+    figures: Mapping[str, Drawing],
+    earlier: Mapping[str, Any],
+    parallel: ParallelSettings,
+) -> dict[str, list[str]]:
+    """Draw what changed; checksums of data and code, and of the PNG, by name."""
+    wanted = {name: digest(drawing) for name, drawing in figures.items()}
+    paths = {name: folder / "figures" / f"{name}.png" for name in figures}
+    todo = [
+        name
+        for name, path in paths.items()
+        if not path.is_file() or earlier.get(name) != [wanted[name], file_checksum(path)]
+    ]
+    jobs = [(paths[name], figures[name]) for name in todo]
+    if len(jobs) <= FEW and parallel.scheduler is None:
+        parallel = ParallelSettings(n_workers=1)
+    for _ in parallel_map(_draw, jobs, parallel, "figures"):
+        pass
+    return {name: [wanted[name], file_checksum(path)] for name, path in paths.items()}
+
+
+def _draw(job: tuple[Path, Drawing]) -> None:
+    path, drawing = job
+    style.write_png(path, drawing.kind, *drawing.data, **drawing.options)
+
+
+def digest(value: Any) -> str:
+    """SHA-256 of data: numbers, texts, arrays, frames, dataclasses, functions (with their module).
+
+    Raises DataError for what has no lasting value.
+    """
+    hasher = hashlib.sha256()
+    for part in _parts(value):
+        hasher.update(f"{len(part)} ".encode() + part)
+    return hasher.hexdigest()
+
+
+def _parts(value: Any) -> Iterable[bytes]:
+    yield type(value).__name__.encode()
+    if value is None or isinstance(value, str | int | float | np.number | np.bool_):
+        yield repr(value).encode()
+    elif isinstance(value, pd.DataFrame | pd.Series):
+        frame = value.to_frame() if isinstance(value, pd.Series) else value
+        yield from _parts([str(name) for name in frame.columns])
+        for k in range(frame.shape[1]):
+            yield from _parts(frame.iloc[:, k].to_numpy())
+    elif isinstance(value, np.ndarray):
+        yield f"{value.dtype} {value.shape}".encode()
+        if value.dtype.hasobject:
+            yield from _parts(value.tolist())
+        else:
+            yield np.ascontiguousarray(value).tobytes()
+    elif isinstance(value, Mapping):
+        yield from _parts([item for pair in value.items() for item in pair])
+    elif isinstance(value, list | tuple):
+        yield str(len(value)).encode()
+        for item in value:
+            yield from _parts(item)
+    elif is_dataclass(value):
+        for each in fields(value):
+            yield from _parts(getattr(value, each.name))
+    elif callable(value):
+        yield f"{value.__module__}.{value.__qualname__} {_code(value.__module__)}".encode()
+    else:
+        raise DataError(f"figure: no checksum of {type(value).__name__}")
+
+
+@cache
+def _code(module: str) -> str:
+    """Checksum of a module, of the drawing code and of matplotlib's version."""
+    names = [module, *(f"flexik.reporting.{name}" for name in DRAWING)]
+    files = [str(import_module(name).__file__) for name in names]
+    return " ".join([str(mpl.__version__), *map(file_checksum, files)])
