@@ -54,7 +54,7 @@ def check_different(name: str, values: list[Any]) -> None:
 
 
 def _kind(given: Any) -> str:
-    keys = given if isinstance(given, dict) else type(given).model_fields
+    keys = given if isinstance(given, dict) else getattr(type(given), "model_fields", ())
     return "points" if "points" in keys else "random"
 
 

@@ -4,60 +4,76 @@ Source: Rouvinen 1999, section 4.1 and figure 4.7.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar, Literal
 
 import numpy as np
 
-from flexik.errors import ParameterError
-from flexik.positioning.ingredients import Ingredients
-from flexik.positioning.method import REACHED, Array, Command, Network, checked, take_network
-from flexik.positioning.rigid_inverse import RigidInverse
+from flexik.kinematics.manipulator import Manipulator
+from flexik.kinematics.status import REACHED
+from flexik.parameters.model import Count
+from flexik.positioning import method
+from flexik.positioning.genetic import Genetic, GeneticManipulator
+from flexik.positioning.method import (
+    Answer,
+    Array,
+    Network,
+    checked,
+    planar,
+    rigid_inverse,
+    take_network,
+)
+
+
+class Settings(method.Settings):
+    """See Combined; genetic: the rigid inverse by a genetic algorithm; None: in closed form."""
+
+    method: Literal["combined"] = "combined"
+    needs: ClassVar[str | None] = "deflection"
+    n_corrections: Count = 1
+    genetic: Genetic | None = None
 
 
 @dataclass(frozen=True)
 class Combined:
     """Rigid inverse corrected by the deflection that a network predicts.
 
-    inverse : rigid inverse used before and after the correction.
-    network : predicts the deflection (flexible minus rigid tip, m) from strokes (m) and payload
-        (kg).
-    n_corrections : one as published; more iterate towards strokes whose own deflection is the
+    manipulator : its inverse is used before and after the correction.
+    network : predicts the deflection (flexible minus rigid tip, m) from actuator coordinates and
+        payload (kg).
+    n_corrections : one as published; more iterate towards coordinates whose own deflection is the
         one corrected.
 
-    A row that the inverse fails in any pass keeps the strokes it had and the first failing status.
-    Diagnostics: those of the inverse with the prefixes `first_` and `corrected_` (the last pass),
-    and the predicted deflection of the last pass, `deflection_x` and `deflection_y`, m.
+    A row that the inverse fails in any pass keeps the coordinates it had and the first failing
+    status. Diagnostics: those of the inverse with the prefixes `first_` and `corrected_` (the last
+    pass), and the predicted deflection of the last pass, `deflection_x` and `deflection_y`, m.
     """
 
-    inverse: RigidInverse
+    manipulator: Manipulator
     network: Network
     n_corrections: int = 1
 
-    def __post_init__(self) -> None:
-        if self.n_corrections < 1:
-            raise ParameterError(f"combined: {self.n_corrections=}, expected 1 or more")
-
-    def __call__(self, targets: Array, payload: Array, initial_strokes: Array) -> Command:
+    def __call__(self, query: Array, current: Array) -> Answer:
         """See `flexik.positioning.method.Method`."""
-        targets = checked("targets", targets, None, 2)
-        payload = checked("payload", payload, len(targets))
-        first = self.inverse(targets, initial_strokes)
-        last, strokes, status = first, first.strokes, first.status
+        targets, payload = planar(query)
+        first = rigid_inverse(self.manipulator, targets, current)
+        last, values, status = first, first.values, first.status
         for _ in range(self.n_corrections):
-            inputs = np.column_stack([strokes, payload])
+            inputs = np.column_stack([values, payload])
             deflection = checked(
                 "predicted deflection", self.network.predict(inputs), *targets.shape
             )
-            last = self.inverse(targets - deflection, strokes, targets)
+            last = self.manipulator.inverse(targets - deflection, values, targets)
             status = np.where(status == REACHED, last.status, status)
-            strokes = np.where((status == REACHED)[:, None], last.strokes, strokes)
-        diagnostics = {f"first_{name}": values for name, values in first.diagnostics.items()}
-        diagnostics |= {f"corrected_{name}": values for name, values in last.diagnostics.items()}
+            values = np.where((status == REACHED)[:, None], last.values, values)
+        diagnostics = {f"first_{name}": found for name, found in first.diagnostics.items()}
+        diagnostics |= {f"corrected_{name}": found for name, found in last.diagnostics.items()}
         diagnostics |= {"deflection_x": deflection[:, 0], "deflection_y": deflection[:, 1]}
-        return Command(strokes, status, diagnostics)
+        return Answer(values, status, diagnostics)
 
 
-def build(ingredients: Ingredients[Any], n_corrections: int = 1) -> Combined:
-    """Build method `combined` with the inverse and the network `deflection` of `ingredients`."""
-    network = take_network(ingredients.networks, "deflection")
-    return Combined(ingredients.inverse, network, n_corrections)
+def build(settings: Settings, ingredients: method.Ingredients) -> Combined:
+    """Method `combined` with the network of `ingredients`."""
+    manipulator = ingredients.manipulator
+    if settings.genetic is not None:
+        manipulator = GeneticManipulator(manipulator, settings.genetic)
+    return Combined(manipulator, take_network(ingredients), settings.n_corrections)

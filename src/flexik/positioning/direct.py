@@ -3,13 +3,15 @@
 Source: Rouvinen 1999, section 4.2 and figure 4.9.
 """
 
-from flexik.positioning.ingredients import Ingredients
-from flexik.positioning.inversion import GaussNewton, GradientDescent
-from flexik.positioning.inverted_network import HasStrokes, InvertedNetwork, inverted
+from typing import ClassVar, Literal
+
+from flexik.positioning.inverted_network import InvertedSettings, build
+
+__all__ = ["Settings", "build"]
 
 
-def build(
-    ingredients: Ingredients[HasStrokes], inversion: GradientDescent | GaussNewton
-) -> InvertedNetwork:
-    """Build method `direct` with the network `direct` of `ingredients`."""
-    return inverted(ingredients, "direct", inversion)
+class Settings(InvertedSettings):
+    """See InvertedSettings."""
+
+    method: Literal["direct"] = "direct"
+    needs: ClassVar[str | None] = "tip"

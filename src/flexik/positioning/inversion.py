@@ -1,17 +1,17 @@
-"""Inverse of a network: strokes at which it predicts the targets, its other inputs held.
+"""Inverse of a network: coordinates at which it predicts the targets, its other inputs held.
 
 Source: Rouvinen 1999, section 2.4.6. Searches run in the normalised units of the network.
 """
 
-import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Self
+from typing import Annotated, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from flexik.errors import ParameterError
 from flexik.learning.perceptron import Network, Normalisation, activate, slope
+from flexik.parameters.model import Count, Model, Positive
 from flexik.positioning.method import Array, PositioningError, checked
 
 # factors of the damping after a better and after a worse step, and its limits
@@ -19,31 +19,27 @@ FALL, RISE = 0.1, 10.0
 DAMPING_MINIMUM, DAMPING_MAXIMUM = 1e-12, 1e10
 
 
-@dataclass(frozen=True)
-class GradientDescent:
-    """Settings of gradient descent with a constant rate, as published (equation 63).
+class GradientDescent(Model):
+    """Gradient descent with a constant rate, as published (equation 63).
 
-    The thesis does not mention stroke limits; here a stroke that a step takes beyond its limit is
-    put on it, and the others go on.
+    The thesis does not mention stroke limits; here a coordinate that a step takes beyond its limit
+    is put on it, and the others go on.
 
-    learning_rate : gamma of equation 63, in normalised units.
+    learning_rate : gamma of equation 63, in normalised units; not published, 0.2 diverges at some
+        poses of the crane.
     tolerance : a row is done below this E_s (equation 59): half the sum of the squared errors of
         the normalised outputs.
     n_iterations : most steps of a row.
     """
 
-    learning_rate: float
-    tolerance: float
-    n_iterations: int
-
-    def __post_init__(self) -> None:
-        _check(self, "learning_rate", 0.0 < self.learning_rate < math.inf, "greater than 0")
-        _check_stopping(self)
+    kind: Literal["gradient_descent"] = "gradient_descent"
+    learning_rate: Positive = 0.15
+    tolerance: Positive = 1e-7
+    n_iterations: Count = 5000
 
 
-@dataclass(frozen=True)
-class GaussNewton:
-    """Settings of damped Gauss-Newton steps (Levenberg-Marquardt) within the stroke limits.
+class GaussNewton(Model):
+    """Damped Gauss-Newton steps (Levenberg-Marquardt) within the limits.
 
     Each row has a damping of its own, which falls after a better step and rises after a worse one.
 
@@ -52,37 +48,23 @@ class GaussNewton:
     n_iterations : most steps of a row, rejected ones among them.
     """
 
-    damping: float
-    tolerance: float
-    n_iterations: int
-
-    def __post_init__(self) -> None:
-        _check(self, "damping", 0.0 < self.damping <= DAMPING_MAXIMUM, "in (0, 1e10]")
-        _check_stopping(self)
-
-
-def _check_stopping(settings: GradientDescent | GaussNewton) -> None:
-    _check(settings, "tolerance", 0.0 < settings.tolerance < math.inf, "greater than 0")
-    _check(settings, "n_iterations", settings.n_iterations >= 1, "1 or more")
-
-
-def _check(settings: object, key: str, valid: bool, expected: str) -> None:
-    if not valid:
-        name = type(settings).__name__
-        raise ParameterError(f"{name}: {key}={getattr(settings, key)}, expected {expected}")
+    kind: Literal["gauss_newton"] = "gauss_newton"
+    damping: Annotated[float, Field(gt=0, le=DAMPING_MAXIMUM)] = 1e-2
+    tolerance: Positive = 1e-12
+    n_iterations: Count = 100
 
 
 class Inversion(NamedTuple):
-    """Strokes found, and how.
+    """Coordinates found, and how.
 
-    strokes : (n, k) in m, within their limits whatever happened.
+    values : (n, k) in m or rad, within their limits whatever happened.
     n_iterations : (n,) steps made.
-    residual : (n,) in m, from the target to the network's output at the strokes.
-    n_clipped : (n,) strokes that a limit stopped in the last step.
+    residual : (n,) in m, from the target to the network's output there.
+    n_clipped : (n,) coordinates that a limit stopped in the last step.
     converged : (n,) whether the search ended below the tolerance.
     """
 
-    strokes: Array
+    values: Array
     n_iterations: NDArray[np.int64]
     residual: Array
     n_clipped: NDArray[np.int64]
@@ -94,14 +76,14 @@ def invert(
     targets: Array,
     held: Array,
     initial: Array,
-    upper_limits: Array,
+    limits: Array,
     settings: GradientDescent | GaussNewton,
 ) -> Inversion:
-    """Strokes (n, k) that make `network` predict `targets` (n, q), from `initial` (n, k), in m.
+    """Coordinates (n, k) at which `network` predicts `targets` (n, q), from `initial` (n, k).
 
-    The inputs of the network are the strokes, then `held` (n, h), which stay as they are. Strokes
-    lie between 0 and `upper_limits` (k,). Rows do not influence each other; one that overflows ends
-    with its last finite strokes.
+    The inputs of the network are the coordinates, then `held` (n, h), which stay as they are.
+    Coordinates lie between `limits` (2, k). Rows do not influence each other; one that overflows
+    ends with its last finite coordinates.
 
     Raises
     ------
@@ -110,34 +92,34 @@ def invert(
     """
     targets = checked("targets", targets, None, len(network.outputs))
     held = checked("held inputs", held, len(targets), None)
-    initial = checked("initial strokes", initial, len(targets), None)
-    upper = checked("stroke limits", upper_limits, initial.shape[1])
+    initial = checked("current coordinates", initial, len(targets), None)
+    limits = checked("limits", limits, 2, initial.shape[1])
     if initial.shape[1] + held.shape[1] != len(network.inputs):
         names = ", ".join(quantity.name for quantity in network.inputs)
         raise PositioningError(
-            f"{initial.shape[1]} strokes and {held.shape[1]} held inputs for a network of "
+            f"{initial.shape[1]} coordinates and {held.shape[1]} held inputs for a network of "
             f"{len(network.inputs)} inputs ({names})"
         )
 
-    k = len(upper)
-    # the strokes' part of the normalisation; a column that was constant moves nothing
+    k = limits.shape[1]
+    # the coordinates' part of the normalisation; a column that was constant moves nothing
     half = network.input_normalisation.half_range[:k]
     to_unit = Normalisation(
         network.input_normalisation.minimum[:k], network.input_normalisation.maximum[:k]
     ).to_unit
     rows = _Rows.of(network, targets, held)
-    start, limits = to_unit(initial), to_unit(np.stack([np.zeros(k), upper]))
-    begin = np.clip(start, *limits)
+    start, unit_limits = to_unit(initial), to_unit(limits)
+    begin = np.clip(start, *unit_limits)
     with np.errstate(over="ignore", invalid="ignore"):  # overflow ends a row
         if isinstance(settings, GradientDescent):
-            found = _gradient_descent(rows, begin, limits, settings)
+            found = _gradient_descent(rows, begin, unit_limits, settings)
         else:
-            found = _gauss_newton(rows, begin, limits, settings)
+            found = _gauss_newton(rows, begin, unit_limits, settings)
         # clipped for rounding, and for columns that were constant
-        strokes = np.clip(initial + half * (found.unit - start), 0.0, upper)
-        residual = np.linalg.norm(network.predict(np.hstack([strokes, held])) - targets, axis=1)
+        values = np.clip(initial + half * (found.unit - start), *limits)
+        residual = np.linalg.norm(network.predict(np.hstack([values, held])) - targets, axis=1)
     n_clipped = found.stopped.sum(axis=1)
-    return Inversion(strokes, found.n_iterations, residual, n_clipped, found.converged)
+    return Inversion(values, found.n_iterations, residual, n_clipped, found.converged)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ joints of a parallel one, a pose. A case names the columns of both, their units 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 import pandas as pd
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flexik.datasets.tables import Field
 from flexik.errors import FlexikError
-from flexik.kinematics.manipulator import Manipulator
+from flexik.kinematics.manipulator import Manipulator, RigidSolution
 from flexik.parameters.model import Count, Model, Name
 
 Array = NDArray[np.float64]
@@ -85,12 +85,19 @@ class Network(Protocol):
 class Settings(Model):
     """Base of the settings of a method of planar machines; its file adds its own, with defaults.
 
-    A file of this room that has a class `Settings` with a `method` of its own and a function
+    A file of this room that has a class `Settings` with its name as `method` and a function
     `build(settings, ingredients)` is a method, see positioning.registry.
 
+    needs : word that the network must have learnt (deflection, tip, coordinates, correction);
+        None: it needs none.
+    reads : tables of samples that it is built from.
     network : name of the network it is built from.
     n_targets : the most random targets it is judged on; None: all.
     """
+
+    needs: ClassVar[str | None] = None
+    reads: ClassVar[tuple[str, ...]] = ()
+    method: str
 
     network: Name | None = None
     n_targets: Count | None = None
@@ -101,7 +108,7 @@ class Ingredients:
     """What methods are built from; each takes what it needs.
 
     network : the trained one that the settings name.
-    samples : tables of samples by name, those of `READS` of the method's file.
+    samples : tables of samples by name, those of `reads` of the settings.
     """
 
     manipulator: Manipulator
@@ -120,6 +127,12 @@ def planar(query: Array) -> tuple[Array, Array]:
     """Targets (n, 2) in m and payload (n,) in kg of the `query` (n, 3) of a planar machine."""
     query = checked("query", query, None, 3)
     return query[:, :2], query[:, 2]
+
+
+def rigid_inverse(manipulator: Manipulator, targets: Array, current: Array) -> RigidSolution:
+    """Rigid inverse of `manipulator`; raises PositioningError if `current` is no (n, k)."""
+    current = checked("current coordinates", current, len(targets), len(manipulator.lower))
+    return manipulator.inverse(targets, current)
 
 
 def checked(name: str, values: ArrayLike, *shape: int | None) -> Array:

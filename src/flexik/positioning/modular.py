@@ -4,13 +4,15 @@ Source: Rouvinen 1999, section 4.3 and figure 4.11. The two are one network by
 `flexik.learning.modular.combine`.
 """
 
-from flexik.positioning.ingredients import Ingredients
-from flexik.positioning.inversion import GaussNewton, GradientDescent
-from flexik.positioning.inverted_network import HasStrokes, InvertedNetwork, inverted
+from typing import ClassVar, Literal
+
+from flexik.positioning.inverted_network import InvertedSettings, build
+
+__all__ = ["Settings", "build"]
 
 
-def build(
-    ingredients: Ingredients[HasStrokes], inversion: GradientDescent | GaussNewton
-) -> InvertedNetwork:
-    """Build method `modular` with the combined network `modular` of `ingredients`."""
-    return inverted(ingredients, "modular", inversion)
+class Settings(InvertedSettings):
+    """See InvertedSettings."""
+
+    method: Literal["modular"] = "modular"
+    needs: ClassVar[str | None] = "correction"

@@ -1,24 +1,32 @@
 """Method `none`: the rigid inverse alone; the deflection stays as the error."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar, Literal
 
-from flexik.positioning.ingredients import Ingredients
-from flexik.positioning.method import Array, Command
-from flexik.positioning.rigid_inverse import RigidInverse
+from flexik.kinematics.manipulator import Manipulator
+from flexik.positioning import method
+from flexik.positioning.method import Answer, Array, planar, rigid_inverse
+
+
+class Settings(method.Settings):
+    """None."""
+
+    method: Literal["none"] = "none"
+    needs: ClassVar[str | None] = None
 
 
 @dataclass(frozen=True)
 class Uncompensated:
-    """Strokes of the rigid inverse at the target, whatever the payload."""
+    """Coordinates of the rigid inverse at the target, whatever the payload."""
 
-    inverse: RigidInverse
+    manipulator: Manipulator
 
-    def __call__(self, targets: Array, payload: Array, initial_strokes: Array) -> Command:
+    def __call__(self, query: Array, current: Array) -> Answer:
         """See `flexik.positioning.method.Method`."""
-        return Command(*self.inverse(targets, initial_strokes))
+        targets, _ = planar(query)
+        return Answer(*rigid_inverse(self.manipulator, targets, current))
 
 
-def build(ingredients: Ingredients[Any]) -> Uncompensated:
-    """Build method `none` with the rigid inverse of `ingredients`."""
-    return Uncompensated(ingredients.inverse)
+def build(settings: Settings, ingredients: method.Ingredients) -> Uncompensated:
+    """Method `none`."""
+    return Uncompensated(ingredients.manipulator)

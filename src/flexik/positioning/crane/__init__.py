@@ -1,1 +1,0 @@
-"""What positions the crane alone: its rigid inverses, adaptation, methods from parameters."""
