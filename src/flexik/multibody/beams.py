@@ -122,7 +122,7 @@ def discretise(beam: Beam, pins: tuple[float, ...], refinement: int = 1) -> Elem
     mesh = [stations[0]]
     for start, end in pairwise(stations):
         n = max(1, int(np.ceil((end - start) / longest - 1e-6)))
-        mesh += list(np.linspace(start, end, n + 1)[1:])
+        mesh += [start + (end - start) / n * k for k in range(1, n)] + [end]
     return _reduce(beam, np.array(mesh), pins)
 
 
@@ -135,7 +135,7 @@ def _reduce(beam: Beam, stations: Array, pins: tuple[float, ...]) -> Elements:
     """Integrate section and mass over the elements between `stations`."""
     x, w, element = _quadrature(beam, stations)
     n = len(stations) - 1
-    length = np.diff(stations)
+    length = stations[1:] - stations[:-1]
     flexibility = 1.0 / (beam.youngs_modulus * beam.section.second_moment_at(x))
     middle = (stations[:-1] + stations[1:]) / 2
     bending = _sums(element, w * flexibility, n)
@@ -167,8 +167,10 @@ def _relative_density(beam: Beam, x: Array) -> Array:
 def _quadrature(beam: Beam, stations: Array) -> tuple[Array, Array, NDArray[np.int64]]:
     """Abscissas, weights and element numbers; panels end at stations, table rows and mass ends."""
     cuts = np.concatenate([stations, beam.section.abscissa, beam.mass_span])
-    cuts = np.unique(cuts[(cuts >= stations[0]) & (cuts <= stations[-1])])
-    width = np.diff(cuts)
+    cuts = np.sort(cuts[(cuts >= stations[0]) & (cuts <= stations[-1])])
+    # np.unique, several times faster: meshes are made by the ten thousand
+    cuts = cuts[np.append(True, cuts[1:] != cuts[:-1])]
+    width = cuts[1:] - cuts[:-1]
     x = (cuts[:-1, None] + width[:, None] * _GAUSS_X).ravel()
     w = (width[:, None] * _GAUSS_W).ravel()
     element = np.searchsorted(stations, x, side="right") - 1

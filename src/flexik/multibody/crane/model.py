@@ -49,17 +49,17 @@ def solve(
     crane: FlexibleCrane,
     strokes: Array,
     payload: Array,
-    settle: "Callable[[CraneModel, float], None] | None" = None,
+    settle: "Callable[[CraneModel, float, int], None] | None" = None,
 ) -> tuple[Array, dict[int, SolverError]]:
     """Tip (n, 2) in m at `strokes` (n, 3) in m with `payload` (n,) in kg, and the rows that failed.
 
     Rows in a run of equal strokes are solved one from the other; rows whose meshes have the same
     layout share one system. Each run of strokes starts from the unloaded pose. A row without
     equilibrium holds NaN and is in the second result, with an error that names its strokes and
-    payload. `settle` finds an equilibrium in place of `CraneModel.solve`.
+    payload. `settle` finds it in place of `CraneModel.solve`, told the number of the row.
     """
-    settle = settle or CraneModel.solve
     strokes, payload = np.atleast_2d(strokes), np.atleast_1d(payload)
+    poses = pose(crane.geometry, strokes)
     result = np.full((len(strokes), 2), np.nan)
     failures: dict[int, SolverError] = {}
     models: dict[tuple[tuple[int, ...], ...], CraneModel] = {}
@@ -76,8 +76,11 @@ def solve(
             model = models[layout]
         try:
             if not np.array_equal(row, model.strokes):
-                model.place(row)
-            settle(model, float(mass))
+                model.place(row, CranePose(*(values[k : k + 1] for values in poses)))
+            if settle is None:
+                model.solve(float(mass))
+            else:
+                settle(model, float(mass), k)
             result[k] = model.tip()
         except SolverError as error:
             failures[k] = error
@@ -150,12 +153,12 @@ class CraneModel:
         self.beams["extension"].slide(self._front_pad, self.crane.structure.front_pad - rear_pad)
         self.strokes = np.full(3, np.nan)
 
-    def place(self, strokes: Array) -> None:
-        """Move the reference configuration to the rigid pose at `strokes` (3,) in m.
+    def place(self, strokes: Array, rigid: CranePose | None = None) -> None:
+        """Move the reference configuration to the pose at `strokes` (3,) in m, `rigid` if known.
 
         Raises SolverError where the linkage cannot be assembled.
         """
-        rigid = pose(self.crane.geometry, strokes[None])
+        rigid = rigid or pose(self.crane.geometry, strokes[None])
         if not np.isfinite(rigid.tip).all():
             raise SolverError(f"strokes {listed(strokes)} m: the linkage cannot be assembled")
         self.strokes = strokes

@@ -4,7 +4,6 @@ Stands in for the measured crane of Rouvinen 1999, chapter 4.6. Play is static: 
 the side of its hole to which its force pushes it.
 """
 
-import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
@@ -15,6 +14,7 @@ from flexik.kinematics.crane import CraneGeometry, check_assembly
 from flexik.kinematics.crane_dimensions import LENGTHS, VECTORS, corrected
 from flexik.multibody.beams import Array
 from flexik.multibody.crane.model import PIVOTS, RODS, CraneModel, listed, solve
+from flexik.multibody.crane.statics import joint_forces
 from flexik.multibody.crane.structure import BEAMS, CraneStructure, FlexibleCrane
 
 # B, C, D; G, F, E, H, I of CraneGeometry. H is one pin with the eyes of three rods on it
@@ -31,6 +31,9 @@ ENDS = {
 }
 # A force below this pushes no pin, N: a hundred times the residual of the solver
 FORCE_FREE = 1.0
+
+# Above this a joint force of the rigid crane has the sign of the flexible one's, N
+SIGN_CERTAIN = 500.0
 
 # Pins that move less than this have settled, m
 SETTLED = 1e-6
@@ -146,26 +149,36 @@ def actual_strokes(
 
 def settled_tips(twin: AsBuiltCrane, strokes: Array, payload: Array) -> Array:
     """Tip (n, 2) in m at actual `strokes` (n, 3) in m: `as_built_tips` without the sensors."""
-    settled = functools.partial(settle, twin.play)
+    strokes, payload = np.atleast_2d(strokes), np.atleast_1d(payload)
+    seats = _expected_seats(twin, strokes, payload)
+
+    def settled(model: CraneModel, mass: float, row: int) -> None:
+        settle(twin.play, model, mass, seats[row])
+
     result, failures = solve(twin.crane, strokes, payload, settled)
     if failures:
         raise next(iter(failures.values()))
     return result
 
 
-def settle(play: Play, model: CraneModel, payload: float) -> None:
+# Lengths (4,) that the play adds to RODS, and where the holes of PIVOTS lie from their pins, in m
+Seats = tuple[Array, dict[str, Array]]
+MIDDLE: Seats = (np.zeros(len(RODS)), dict.fromkeys(PIVOTS, np.zeros(2)))
+
+
+def settle(play: Play, model: CraneModel, payload: float, seats: Seats = MIDDLE) -> None:
     """Solve a placed `model` with every pin at the side of its hole to which its force pushes it.
 
     Tension lengthens a rod by the clearances of its ends, compression shortens it; a pivot moves
-    along its reaction. Pins start in the middle of their holes; solving and seating alternate until
-    the seats stay. So the potential energy falls to a minimum within the play: a rod that is pulled
-    where it is shortest and pushed where it is longest hangs free between, at the length without
-    force; one that would stay pulled as well as pushed keeps the side to which it went first.
+    along its reaction. Pins start at `seats`; solving and seating alternate until the seats stay.
+    So the potential energy falls to a minimum within the play: a rod that is pulled where it is
+    shortest and pushed where it is longest hangs free between, at the length without force; one
+    that would stay pulled as well as pushed keeps the side to which it went first.
 
     Raises SolverError as CraneModel.solve does, or if pins still move after PASSES equilibria.
     """
-    slack = np.array([sum(play[pin] for pin in ENDS[name]) for name in RODS])
-    lengths, pivots = np.zeros(len(RODS)), dict.fromkeys(PIVOTS, np.zeros(2))
+    slack = _slack(play)
+    lengths, pivots = seats
     stiffness = np.zeros((len(RODS), len(RODS)))
     last: tuple[Array, Array] | None = None
     for _ in range(PASSES):
@@ -184,6 +197,30 @@ def settle(play: Play, model: CraneModel, payload: float) -> None:
     raise SolverError(
         f"joint play does not settle at strokes {listed(model.strokes)} m with {payload:g} kg"
     )
+
+
+def _expected_seats(twin: AsBuiltCrane, strokes: Array, payload: Array) -> list[Seats]:
+    """Seats by statics of the rigid crane, the middle where those leave a rod's side in doubt.
+
+    They are right but for micrometres, which saves an equilibrium of two.
+    """
+    gravity = twin.crane.structure.gravity
+    loads = -gravity * payload[:, None] * [0.0, 1.0]
+    forces = joint_forces(twin.crane, strokes, loads, gravity).joints
+    tension = np.column_stack([forces[name] for name in RODS])
+    certain = (np.abs(tension) > SIGN_CERTAIN).all(axis=1)
+    lengths = np.copysign(_slack(twin.play), tension)
+    return [
+        (lengths[k], {p: _hung(twin.play[p], MIDDLE[1][p], forces[p][k]) for p in PIVOTS})
+        if certain[k]
+        else MIDDLE
+        for k in range(len(strokes))
+    ]
+
+
+def _slack(play: Play) -> Array:
+    """How much longer or shorter RODS become, (4,) in m."""
+    return np.array([sum(play[pin] for pin in ENDS[name]) for name in RODS])
 
 
 def _updated(stiffness: Array, longer: Array, slacker: Array) -> Array:

@@ -1,1 +1,0 @@
-"""The crane as it was built."""
