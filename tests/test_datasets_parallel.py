@@ -18,9 +18,9 @@ from flexik.datasets.parallel import (
     parallel_map,
     parallel_unordered,
 )
-from flexik.datasets.resumable import compute_table
+from flexik.datasets.parts import Part, Work, make, rows
 from flexik.datasets.tables import Field
-from flexik.errors import DataError, FlexikError, ParameterError, SolverError
+from flexik.errors import FlexikError, ParameterError, SolverError
 from flexik.files import write_text
 
 ONE, TWO = ParallelSettings(1), ParallelSettings(2)
@@ -41,6 +41,12 @@ class Squares(Sequence[int]):
             raise IndexError(index)
         self.asked += 1
         return index**2
+
+
+@pytest.fixture(autouse=True)
+def at_once(monkeypatch):
+    """Start processes however short the work."""
+    monkeypatch.setattr(parallel, "START_SECONDS", 0.0)
 
 
 # one process: two clusters at a time are in each other's way
@@ -206,10 +212,13 @@ def solve(part: int) -> dict[str, np.ndarray]:
     return {"x": x, "part": np.full(90, part)}
 
 
+def prepare():
+    return Work(solve, range(20), rows(*FIELDS))
+
+
 def table_bytes(folder: Path, settings: ParallelSettings) -> bytes:
-    path = folder / "out" / "table.parquet"
-    compute_table(path, solve, range(20), FIELDS, "c", "k", settings, "", folder / "parts")
-    return path.read_bytes()
+    make(folder / "out", [Part("table", prepare)], settings)
+    return (folder / "out" / "table.parquet").read_bytes()
 
 
 def test_dask_gives_the_same_bytes(cluster, tmp_path):
@@ -233,11 +242,5 @@ def test_dask_errors_arrive(cluster):
     settings = ParallelSettings(scheduler=cluster)
     with pytest.raises(SolverError, match=r"^sample 3: no equilibrium$"):
         list(parallel_map(fail_at_three, range(20), settings))
-    with pytest.raises(DataError, match=r"part-0000\d\.parquet: .*missing"):
-        compute_table("x", wrong_columns, [0], FIELDS, "c", "k", settings, "", "unused")
     with pytest.raises(FlexikError, match="the Dask cluster lost a task"):
         list(parallel_map(die, range(4), settings))
-
-
-def wrong_columns(part: int) -> dict[str, np.ndarray]:
-    return {"x": np.zeros(1)}

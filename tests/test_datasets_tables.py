@@ -10,14 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flexik.datasets import tables
-from flexik.datasets.tables import (
-    Field,
-    concatenate_tables,
-    read_table,
-    table_metadata,
-    write_table,
-)
+from flexik.datasets.tables import Field, read_table, stored_fields, write_table
 from flexik.errors import DataError
 
 FIELDS = (
@@ -25,7 +18,6 @@ FIELDS = (
     Field("n_steps", "1", "load steps", "int64"),
     Field("mechanism", "1", "name of the mechanism", "string"),
 )
-CHECKSUM = "c0ffee"
 
 
 def columns(n_rows: int = 60, seed: int = 0) -> dict[str, np.ndarray]:
@@ -40,7 +32,7 @@ def columns(n_rows: int = 60, seed: int = 0) -> dict[str, np.ndarray]:
 @pytest.fixture
 def table(tmp_path: Path) -> Path:
     path = tmp_path / "grid.parquet"
-    write_table(path, columns(), FIELDS, CHECKSUM)
+    write_table(path, columns(), FIELDS)
     return path
 
 
@@ -48,8 +40,8 @@ def test_round_trip_keeps_values_order_and_types(tmp_path):
     path = tmp_path / "new" / "grid.parquet"
     data = columns()
     data["stroke"][:3] = np.nan, np.inf, -0.0
-    write_table(path, dict(reversed(data.items())), FIELDS, CHECKSUM)
-    frame = read_table(path, FIELDS, CHECKSUM)
+    write_table(path, dict(reversed(data.items())), FIELDS)
+    frame = read_table(path, FIELDS)
     assert list(frame.columns) == ["stroke", "n_steps", "mechanism"]
     assert frame["stroke"].to_numpy().tobytes() == data["stroke"].tobytes()
     assert frame["n_steps"].dtype == np.int64
@@ -57,23 +49,19 @@ def test_round_trip_keeps_values_order_and_types(tmp_path):
     assert frame["mechanism"].tolist() == data["mechanism"].tolist()
 
 
-def test_units_descriptions_and_metadata_are_in_the_file(tmp_path):
+def test_units_and_descriptions_are_in_the_file(tmp_path):
     path = tmp_path / "grid.parquet"
-    write_table(path, columns(), FIELDS, CHECKSUM, {"model": "crane"})
+    write_table(path, columns(), FIELDS)
     # read by pyarrow itself, as any other program would
     field = pq.read_schema(path).field("stroke")
     assert field.metadata[b"unit"] == b"m"
     assert field.metadata[b"description"] == b"stroke of the lift cylinder"
-    assert table_metadata(path) == {
-        "format_version": "1",
-        "parameters_checksum": CHECKSUM,
-        "model": "crane",
-    }
+    assert stored_fields(path) == list(FIELDS)
 
 
 def test_same_data_same_bytes_and_readable_by_others(tmp_path):
-    write_table(tmp_path / "a", columns(), FIELDS, CHECKSUM, {"y": "1", "x": "2"})
-    write_table(tmp_path / "b", columns(), FIELDS, CHECKSUM, {"x": "2", "y": "1"})
+    write_table(tmp_path / "a", columns(), FIELDS)
+    write_table(tmp_path / "b", columns(), FIELDS)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
     assert (tmp_path / "a").stat().st_mode & 0o777 == 0o644
 
@@ -95,7 +83,7 @@ def test_wrong_columns_are_refused_and_the_old_file_stays(table, change, message
     before = table.read_bytes()
     data = {k: v for k, v in {**columns(), **change}.items() if v is not None}
     with pytest.raises(DataError, match=f"grid.parquet.*{message}"):
-        write_table(table, data, FIELDS, CHECKSUM)
+        write_table(table, data, FIELDS)
     assert table.read_bytes() == before
     assert list(table.parent.iterdir()) == [table]
 
@@ -108,7 +96,7 @@ def test_a_failing_writer_leaves_the_old_file(table, monkeypatch):
 
     monkeypatch.setattr(pq.ParquetWriter, "write_table", fail)
     with pytest.raises(OSError, match="no space"):
-        write_table(table, columns(seed=1), FIELDS, CHECKSUM)
+        write_table(table, columns(seed=1), FIELDS)
     assert table.read_bytes() == before
     assert list(table.parent.iterdir()) == [table]
 
@@ -124,18 +112,12 @@ def test_a_failing_writer_leaves_the_old_file(table, monkeypatch):
 )
 def test_other_columns_units_or_types_are_told(table, fields, message):
     with pytest.raises(DataError, match=f"grid.parquet.*{message}"):
-        read_table(table, fields, CHECKSUM)
-
-
-def test_other_parameters_are_told_if_asked(table):
-    assert len(read_table(table, FIELDS)) == 60
-    with pytest.raises(DataError, match=r"grid.parquet: made with other.* c0ffee.*, expected bad"):
-        read_table(table, FIELDS, "bad")
+        read_table(table, fields)
 
 
 def test_missing_and_foreign_files_are_told(tmp_path):
     path = tmp_path / "grid.parquet"
-    for read in (table_metadata, lambda path: read_table(path, FIELDS)):
+    for read in (stored_fields, read_table):
         with pytest.raises(DataError, match=r"grid\.parquet: no such file"):
             read(path)
     path.write_text("stroke,n_steps\n1,2\n")
@@ -146,17 +128,15 @@ def test_missing_and_foreign_files_are_told(tmp_path):
         read_table(path, FIELDS)
 
 
-def test_bad_declarations_are_refused(tmp_path):
+def test_bad_declarations_are_refused():
     with pytest.raises(DataError, match=r"field x: .*float32.*expected one of"):
         Field("x", "m", "", "float32")
-    with pytest.raises(DataError, match=r"reserved keys \['parameters_checksum'\]"):
-        write_table(tmp_path / "x", {}, [], CHECKSUM, {"parameters_checksum": "0"})
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, bytes, pd.DataFrame]:
     path = tmp_path_factory.mktemp("damage") / "grid.parquet"
-    write_table(path, columns(), FIELDS, CHECKSUM)
+    write_table(path, columns(), FIELDS)
     return path.with_name("damaged.parquet"), path.read_bytes(), read_table(path, FIELDS)
 
 
@@ -166,7 +146,7 @@ def test_a_truncated_file_never_reads(whole, data):
     path, content, _ = whole
     path.write_bytes(content[: data.draw(st.integers(0, len(content) - 1))])
     with pytest.raises(DataError, match=r"damaged\.parquet"):
-        read_table(path, FIELDS, CHECKSUM)
+        read_table(path, FIELDS)
 
 
 def test_a_changed_number_of_rows_is_noticed(whole):
@@ -177,7 +157,7 @@ def test_a_changed_number_of_rows_is_noticed(whole):
     for place in places:
         path.write_bytes(content[: place + 1] + b"p" + content[place + 2 :])
         with pytest.raises(DataError, match=r"damaged\.parquet"):
-            read_table(path, FIELDS, CHECKSUM)
+            read_table(path, FIELDS)
 
 
 @given(data=st.data())
@@ -189,44 +169,8 @@ def test_a_changed_byte_is_noticed_or_harmless(whole, data):
     changed[position] ^= data.draw(st.integers(1, 255))
     path.write_bytes(changed)
     try:
-        read = read_table(path, FIELDS, CHECKSUM)
+        read = read_table(path, FIELDS)
     except DataError as error:
         assert "damaged.parquet" in str(error)  # noqa: PT017
     else:
         pd.testing.assert_frame_equal(read, frame, check_exact=True)
-
-
-@given(
-    cuts=st.lists(st.integers(0, 60), max_size=6).map(sorted),
-    rows_per_group=st.sampled_from([1, 7, 20, 60, 100]),
-)
-@settings(max_examples=40, deadline=None)
-def test_concatenation_does_not_depend_on_the_cuts(tmp_path_factory, cuts, rows_per_group):
-    folder = tmp_path_factory.mktemp("cuts")
-    data = columns()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(tables, "ROWS_PER_GROUP", rows_per_group)
-        write_table(folder / "whole", data, FIELDS, CHECKSUM, {"model": "crane"})
-        parts = []
-        for start, stop in zip([0, *cuts], [*cuts, 60], strict=True):
-            parts.append(folder / f"{len(parts)}")
-            part = {name: values[start:stop] for name, values in data.items()}
-            write_table(parts[-1], part, FIELDS, CHECKSUM, {"key": "part"})
-        concatenate_tables(parts, folder / "joined", FIELDS, CHECKSUM, {"model": "crane"})
-    assert (folder / "joined").read_bytes() == (folder / "whole").read_bytes()
-    groups = pq.ParquetFile(folder / "joined").metadata
-    assert groups.num_row_groups == -(-60 // rows_per_group)
-
-
-@pytest.mark.parametrize("damage", ["truncated", "other parameters"])
-def test_concatenation_of_a_bad_part_leaves_the_old_file(table, damage):
-    part = table.with_name("part.parquet")
-    if damage == "truncated":
-        part.write_bytes(table.read_bytes()[:-9])
-    else:
-        write_table(part, columns(), FIELDS, "bad")
-    before = table.read_bytes()
-    with pytest.raises(DataError, match=r"part\.parquet"):
-        concatenate_tables([table, part], table, FIELDS, CHECKSUM)
-    assert table.read_bytes() == before
-    assert sorted(table.parent.iterdir()) == [table, part]

@@ -131,7 +131,7 @@ def _evaluate_all(
     if len(indices) == 0:
         return
     with _progress_bar(len(indices), description) as bar:
-        if settings.scheduler is None:
+        if settings.scheduler is None and START_SECONDS > 0.0:
             started, n = time.perf_counter(), len(indices)
             for done, i in enumerate(indices, 1):
                 yield _evaluate(function, i, items[i])

@@ -77,14 +77,14 @@ def rows(*fields: Field) -> Callable[[list[Columns]], Mapping[str, Writer]]:
 
 
 def stacked(results: Sequence[Columns], fields: Sequence[Field]) -> dict[str, np.ndarray]:
-    """Columns `fields` of all `results`, one below the other."""
+    """Columns `fields` of all `results`, one below the other; raises DataError if one is missing."""
+    for result in results:
+        if missing := [f.name for f in fields if f.name not in result]:
+            raise DataError(f"expected columns {[f.name for f in fields]}, but {missing} missing")
     types = {"string": np.str_, "int64": np.int64, "float64": np.float64}
-    return {
-        f.name: np.concatenate([np.asarray(r[f.name], dtype=types[f.dtype]) for r in results])
-        if results
-        else np.empty(0, dtype=types[f.dtype])
-        for f in fields
-    }
+    empty = {f.name: [np.empty(0, dtype=types[f.dtype])] for f in fields}
+    found = {f.name: [result[f.name] for result in results] for f in fields} if results else empty
+    return {name: np.concatenate(pieces) for name, pieces in found.items()}
 
 
 def table(columns: Columns, fields: Sequence[Field]) -> Writer:
@@ -351,7 +351,7 @@ def _plain(value: Any, modules: set[str]) -> Any:
 def _read_item(path: Path) -> Columns | None:
     """Arrays of a finished item; None if there is none, or it is damaged."""
     try:
-        with np.load(path, allow_pickle=False) as data:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             return {name: data[name] for name in data.files}
     except Exception:  # whatever damage makes NumPy or zipfile raise: the item is computed again
         return None

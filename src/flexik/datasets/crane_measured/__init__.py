@@ -1,1 +1,0 @@
-"""Campaigns on a measured crane, and what is learnt from them."""

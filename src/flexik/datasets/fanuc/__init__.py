@@ -1,1 +1,0 @@
-"""Taught path, random poses and errors of the six-joint arm."""
