@@ -6,7 +6,7 @@ and `cases/NAME/page.md.j2`, which holds every sentence. Rooms inside:
 - tables: `Table(frame, decimals)`, `table(rows, {"mean R (mm)": mm("mean_error")})`
   -> CSV, Markdown
 - chart: `chart(Layer(...), ..., x=Axis(...), y=Axis(...), panel=, looks=, rules=)`: panels of
-  lines, dots, steps, bands, bars, areas (bodies of a mechanism) and texts; most figures are one call
+  lines, dots, steps, bands, bars, areas (bodies) and texts; most figures are one call
 - kinds: `strips` (dots or bars by category), `beside` (ours beside published), `distribution`,
   `sizes` (error against size), `sequences` (numbers in their order)
 - plane: `maps` (a value over the plane, bright is bad), `space` (a mechanism of three dimensions)
@@ -34,10 +34,12 @@ Example::
             rules=[Rule("y", 0.02, "published")],
         ),
     }
+    content = Content(
+        tables, figures, {"combined.mean_error_mm": 1.78}, {"n": 125, "best": best, "n_failed": 0}
+    )
     write_report(
-        Path("reports/arm"), Path(__file__).with_name("page.md.j2"), tables=tables, figures=figures,
-        metrics={"combined.mean_error_mm": 1.78}, values={"n": 125, "best": best, "errors": errors},
-        sources={"params.yaml: arm": checksum}, record=Path("data/arm/report.json"),
+        Path("reports/arm"), Path(__file__).with_name("page.md.j2"), content | other_content,
+        sources=made_from(section, [machine_file]), record=Path("data/arm/report.json"),
     )
 
 with the template::

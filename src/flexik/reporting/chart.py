@@ -173,7 +173,7 @@ def chart(
         title = titles.get(name, "" if name is None else str(name))
         axes.set_title(textwrap.fill(title, TITLE_CHARACTERS // columns))
         if equal:
-            axes.set_aspect("equal", adjustable="box" if columns == 1 else "datalim")
+            axes.set_aspect("equal", adjustable="box")
     for k, axes in enumerate(grid):
         if k >= len(names):
             axes.set_axis_off()

@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 # bright is bad; neither end is white, which is left to the empty squares
 MAP = ListedColormap(mpl.colormaps["magma"](np.linspace(0.08, 0.95, 256)))
 STEPS = [float(f"{m}e{k}") for k in range(-18, 19) for m in (1, 2, 5)]
+MILLIMETRES = tuple(Axis(f"{k} (mm)", style.MM) for k in "xyz")
 SPAN = 1e5  # greatest over least value told apart
 
 
@@ -110,7 +111,7 @@ def _means(rows: pd.DataFrame, x: str, y: str, value: str, edges: list[Array]) -
 def space(
     *layers: Layer,
     z: str = "z",
-    axes_of: Sequence[Axis] = tuple(Axis(f"{k} (mm)", style.MM) for k in "xyz"),
+    axes_of: Sequence[Axis] = MILLIMETRES,
     looks: dict[Any, Any] | None = None,
     view: tuple[float, float] = (18.0, -50.0),
     height: float = 5.6,

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -43,15 +43,41 @@ def draw(kind: Callable[..., Figure], *data: Any, **options: Any) -> Drawing:
     return Drawing(kind, data, options)
 
 
+@dataclass(frozen=True)
+class Content:
+    """What a report, or a part of it, consists of.
+
+    tables, figures : by name, which is their path below the folder of the report (tables) or below
+        its `figures`, without suffix.
+    metrics : for metrics.json.
+    values : for the sentences of the template.
+    files : further texts by path below the folder.
+    """
+
+    tables: Mapping[str, Table] = field(default_factory=dict)
+    figures: Mapping[str, Drawing] = field(default_factory=dict)
+    metrics: Mapping[str, float | None] = field(default_factory=dict)
+    values: Mapping[str, Any] = field(default_factory=dict)
+    files: Mapping[str, str] = field(default_factory=dict)
+
+    def __or__(self, other: "Content") -> "Content":
+        """Both."""
+        pairs = {f.name: {**getattr(self, f.name), **getattr(other, f.name)} for f in fields(self)}
+        return Content(**pairs)
+
+
+def made_from(section: Any, files: Iterable[Path | str]) -> dict[str, str]:
+    """Checksums of the keys of `section` (a model of params.yaml) and of `files`."""
+    keys = section.model_dump(mode="json")
+    found = {f"params.yaml: {key}": digest(value) for key, value in keys.items()}
+    return found | {Path(path).as_posix(): file_checksum(path) for path in files}
+
+
 def write_report(
     folder: Path,
     template: Path,
+    content: Content,
     *,
-    tables: Mapping[str, Table],
-    figures: Mapping[str, Drawing],
-    metrics: Mapping[str, float | None],
-    values: Mapping[str, Any],
-    files: Mapping[str, str] | None = None,
     sources: Mapping[str, str] | None = None,
     record: Path,
     parallel: ParallelSettings | None = None,
@@ -64,16 +90,10 @@ def write_report(
         Of the report.
     template
         Page, see reporting.page; shows all tables and figures.
-    tables, figures
-        By name, which is their path below `folder` (tables) or `folder`/figures, without suffix.
-    metrics
-        For metrics.json.
-    values
-        For the sentences of the template.
-    files
-        Further texts by path below `folder`.
+    content
+        All there is to write; parts are put together by `|`.
     sources
-        Checksums by the name of what the report was made from: provenance.csv.
+        Checksums by the name of what the report was made from, see made_from: provenance.csv.
     record
         JSON file of what was written and drawn from what. A figure whose data and drawing code are
         those of the record is not drawn again; a file of the record that is no longer made goes.
@@ -85,9 +105,9 @@ def write_report(
     DataError
         See reporting.page.render and the kinds of figures. Nothing is written then but figures.
     """
-    page = render(template, tables, figures, values)
-    texts = dict(files or {})
-    for name, table in tables.items():
+    page = render(template, content.tables, content.figures, content.values)
+    texts, figures = dict(content.files), content.figures
+    for name, table in content.tables.items():
         texts |= {f"{name}.csv": table.csv, f"{name}.md": page.tables[name]}
     if sources:
         rows = pd.DataFrame({"source": list(sources), "SHA-256": list(sources.values())})
@@ -97,7 +117,7 @@ def write_report(
     drawn = _draw_all(folder, figures, earlier["figures"], parallel or ParallelSettings())
     for name, text in texts.items():
         write_text(folder / name, text)
-    write_json(folder / "metrics.json", dict(metrics))
+    write_json(folder / "metrics.json", dict(content.metrics))
     made = sorted([*texts, "metrics.json", *(f"figures/{name}.png" for name in figures)])
     for name in set(earlier["files"]) - set(made):
         (folder / name).unlink(missing_ok=True)
