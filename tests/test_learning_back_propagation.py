@@ -1,15 +1,13 @@
 """Back-propagation of several networks side by side."""
 
 import numpy as np
-import pytest
 
 from flexik.learning.back_propagation import BackPropagation, minimise, minimise_together
 from flexik.learning.problem import problem
 from flexik.learning.weights import flatten, initial_weights
 
 
-@pytest.mark.parametrize("mode", ["pattern", "batch"])
-def test_networks_together_become_what_they_are_alone(mode):
+def test_networks_together_become_what_they_are_alone():
     rng = np.random.default_rng(3)
     inputs = rng.uniform(-1.0, 1.0, (30, 2))
     problems = [problem("logistic", inputs, np.sin(inputs[:, [0]] + k)) for k in range(4)]
@@ -18,7 +16,7 @@ def test_networks_together_become_what_they_are_alone(mode):
     ]
     # the first stops early, the second beyond all numbers, the last takes passes back
     settings = [
-        BackPropagation(n_iterations=20, mode=mode, **each)
+        BackPropagation(n_iterations=20, mode="pattern", **each)
         for each in (
             {"goal": 0.1},
             {"learning_rate": 50.0, "error_increase": 1e300, "minimum_rate": 50.0},
