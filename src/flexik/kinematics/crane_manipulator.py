@@ -14,8 +14,14 @@ from flexik.kinematics.crane import (
     smallest_extension,
 )
 from flexik.kinematics.manipulator import RigidSolution
+from flexik.machines.crane import Machine
 
 STEP = 0.01  # m, of initial positions
+
+
+def geometry_of(machine: Machine) -> CraneGeometry:
+    """Rigid geometry of `machine`."""
+    return CraneGeometry(**machine.geometry.model_dump())
 
 
 @dataclass(frozen=True)

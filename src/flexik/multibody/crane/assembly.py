@@ -1,34 +1,31 @@
-"""The flexible crane as params.yaml describes it."""
+"""The flexible crane as data/machines/crane.yaml describes it."""
 
 import math
 from pathlib import Path
 
-from flexik import parameters
 from flexik.errors import DataError
 from flexik.files import read_json
-from flexik.kinematics.crane import CraneGeometry
+from flexik.kinematics.crane_manipulator import geometry_of
+from flexik.machines.crane import Machine, Structure
 from flexik.multibody.beams import Beam, read_section
-from flexik.multibody.crane.model import FlexibleCrane
-from flexik.multibody.crane.structure import CraneStructure, Rod
+from flexik.multibody.crane.structure import CraneStructure, FlexibleCrane, Rod
 
 
-def flexible_crane(crane: parameters.Crane, spring_stiffness: float) -> FlexibleCrane:
-    """Build the crane of section `crane` on a ground spring of `spring_stiffness` N m/rad.
+def flexible_crane(machine: Machine, spring_stiffness: float) -> FlexibleCrane:
+    """Build the crane `machine` on a ground spring of `spring_stiffness` N m/rad.
 
     Raises DataError if a section table cannot be read.
     """
-    given = crane.structure
-    beams = {name: _beam(given, name) for name in type(given.beams).model_fields}
+    given = machine.structure
     structure = CraneStructure(
-        **beams,
+        **{name: _beam(given, name) for name in given.beams.sections},
         rocker=Rod(given.rocker.mass, given.rocker.centre_of_mass),
         coupler=Rod(given.coupler.mass, given.coupler.centre_of_mass),
         lift_axis_height=given.lift_axis_height,
         jib_axis_height=given.jib_axis_height,
         gravity=given.gravity,
     )
-    geometry = CraneGeometry(**crane.geometry.model_dump())
-    return FlexibleCrane(geometry, structure, spring_stiffness, given.element)
+    return FlexibleCrane(geometry_of(machine), structure, spring_stiffness, given.element)
 
 
 def read_spring_stiffness(path: Path | str) -> float:
@@ -40,11 +37,11 @@ def read_spring_stiffness(path: Path | str) -> float:
     return float(stiffness)
 
 
-def _beam(structure: parameters.Structure, name: str) -> Beam:
+def _beam(structure: Structure, name: str) -> Beam:
     given = getattr(structure.beams, name)
     try:
         section = read_section(given.section)
     except DataError as error:
-        raise DataError(f"crane.structure.beams.{name}.section: {error}") from None
+        raise DataError(f"structure.beams.{name}.section: {error}") from None
     others = given.model_dump(exclude={"section"})
     return Beam(section=section, youngs_modulus=structure.youngs_modulus, **others)

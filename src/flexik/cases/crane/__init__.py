@@ -1,0 +1,1 @@
+"""The log crane of Rouvinen (1999)."""

@@ -1,0 +1,1 @@
+"""Machines as their files in data/machines describe them, checked."""
