@@ -12,12 +12,13 @@ from pathlib import Path
 
 import yaml
 
-from flexik import stage
-from flexik.errors import DataError, FlexikError
-from flexik.files import write_text
-from flexik.parameters import PARAMETERS_FILE, overlay, read_yaml, validate
-
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "src"))
+
+from flexik import stage  # noqa: E402
+from flexik.errors import DataError, FlexikError  # noqa: E402
+from flexik.files import write_text  # noqa: E402
+from flexik.parameters.reading import PARAMETERS_FILE, overlay, read_yaml  # noqa: E402
 
 
 def main() -> None:
@@ -36,15 +37,10 @@ def run(profile: Path, folder: Path) -> None:
     """Copy the project to `folder` with `profile` laid over params.yaml, and run the pipeline."""
     copy_project(folder)
     values = overlay(read_yaml(folder / PARAMETERS_FILE), read_yaml(profile))
-    validate(values, str(profile))
     write_text(folder / PARAMETERS_FILE, yaml.safe_dump(values, sort_keys=False))
     # the stages' `python` is the one that runs this file
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    environment = os.environ | {
-        "PATH": path,
-        "PYTHONPATH": str(folder.resolve() / "src"),  # the copy runs its own code
-        "DVC_NO_ANALYTICS": "1",
-    }
+    environment = os.environ | {"PATH": path, "DVC_NO_ANALYTICS": "1"}
     done = subprocess.run(["dvc", "repro"], cwd=folder, env=environment, check=False)
     if done.returncode:
         raise FlexikError(f"profile {profile}: the pipeline failed in {folder}")
@@ -65,7 +61,7 @@ def copy_project(folder: Path) -> None:
         raise DataError(f"{folder}: expected an empty or a new folder")
     for name in listed.stdout.splitlines():
         source, target = ROOT / name, folder / name
-        # the lock is of other parameters, and long: DVC reads and writes it at every stage
+        # the lock is of other parameters
         if source.is_file() and name != "dvc.lock":  # a tracked file may be deleted in the tree
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, target)

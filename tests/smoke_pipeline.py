@@ -8,40 +8,37 @@ from pathlib import Path
 
 import yaml
 
-from flexik.parameters import PARAMETERS_FILE, read_yaml
+from flexik.parameters.reading import PARAMETERS_FILE, overlay, read_yaml
 
 ROOT = Path(__file__).parents[1]
-CRANE, FANUC, SMARTEE = (
-    read_yaml(ROOT / PARAMETERS_FILE)[case] for case in ("crane", "fanuc", "smartee")
-)
-GENERATED = ("grid", "selection")
+PROFILE = ROOT / "profiles/smoke.yaml"
+PARAMETERS = overlay(read_yaml(ROOT / PARAMETERS_FILE), read_yaml(PROFILE))
 
 
-def environment(project=None, **more):
-    """As a user of the Makefile has it; the stages of `project` run the code of `project`."""
+def environment(**more):
+    """As a user of the Makefile has it."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("FLEXIK_")}
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    own = {"PYTHONPATH": str(project / "src")} if project else {}
-    return kept | {"PATH": path, "DVC_NO_ANALYTICS": "1", "OMP_NUM_THREADS": "1"} | own | more
+    return kept | {"PATH": path, "DVC_NO_ANALYTICS": "1"} | more
 
 
 def call(project, *command, **more):
     return subprocess.run(
         command,
         cwd=project,
-        env=environment(project, **more),
+        env=environment(**more),
         capture_output=True,
         text=True,
         check=False,
     )
 
 
-def stage(project, script, *arguments, **more):
-    return call(project, sys.executable, f"stages/{script}", *arguments, **more)
+def stage(project, name, case, **more):
+    return call(project, sys.executable, f"stages/{name}.py", case, **more)
 
 
-def reproduce(project):
-    return call(project, "dvc", "repro")
+def reproduce(project, *stages):
+    return call(project, "dvc", "repro", *stages)
 
 
 def stages_run(done):
@@ -57,13 +54,12 @@ def edit(project, **values):
         section = data
         for name in path:
             section = section[name]
-        assert last in section
         section[last] = value
     (project / PARAMETERS_FILE).write_text(yaml.safe_dump(data, sort_keys=False))
 
 
-def snapshot(project):
-    """Bytes and time of change of all files but what dvc and git keep for themselves."""
+def snapshot(project, *folders):
+    """Bytes and time of change of all files (of `folders`) but what dvc and git keep."""
     return {
         path.relative_to(project).as_posix(): (
             hashlib.sha256(path.read_bytes()).hexdigest(),
@@ -73,11 +69,13 @@ def snapshot(project):
         if path.is_file()
         and path.relative_to(project).parts[0] not in {".git", ".dvc"}
         and "__pycache__" not in path.parts
+        and (not folders or path.relative_to(project).as_posix().startswith(folders))
     }
 
 
-def generated(project):
-    return [(project / "data/crane" / f"{name}.parquet").read_bytes() for name in GENERATED]
+def changed(before, after):
+    """Names of files that another run wrote, removed or added."""
+    return {name for name in before.keys() | after.keys() if before.get(name) != after.get(name)}
 
 
 def one_error(done):
