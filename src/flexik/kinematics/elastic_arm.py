@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flexik.kinematics.manipulator import RigidSolution
 from flexik.kinematics.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
 
 Array = NDArray[np.float64]
@@ -28,7 +29,10 @@ ANGLE_TOLERANCE = 1e-10
 
 @dataclass(frozen=True)
 class ArmGeometry:
-    """Lengths of the two links in m, and the interval of each joint angle in rad."""
+    """Lengths of the two links in m, and the interval of each joint angle in rad.
+
+    A kinematics.manipulator.Manipulator, whose actuator coordinates are the joint angles.
+    """
 
     lengths: tuple[float, float]
     limits: tuple[Interval, Interval]
@@ -42,6 +46,32 @@ class ArmGeometry:
     def upper(self) -> Array:
         """Largest joint angles (2,) in rad."""
         return np.array([high for _, high in self.limits])
+
+    def forward(self, values: Array) -> Array:
+        """Tip (n, 2) in m of the rigid arm at angles (n, 2) in rad."""
+        values = np.atleast_2d(values)
+        return flexible_forward(self, values, np.zeros((len(values), 6)))
+
+    def inverse(
+        self, targets: Array, current: Array, original_targets: Array | None = None
+    ) -> RigidSolution:
+        """Exact inverse on the elbow that `inverse_by_rule` chooses for the original target.
+
+        So a correction of some millimetres does not turn the elbow over. Where the corrected target
+        is not reached with this elbow, the rule is asked again, which reaches what either elbow
+        reaches. The rule leaves nothing to choose: the current angles serve unreached rows only.
+        """
+        angles, status = inverse_by_rule(self, targets)
+        if original_targets is not None:
+            original = np.nan_to_num(inverse_by_rule(self, original_targets).angles)
+            same = inverse(self, targets, elbow(original))
+            angles = np.where(same.reached[:, None], same.angles, angles)
+        reached = (status == REACHED)[:, None]
+        return RigidSolution(np.where(reached, angles, current), status, {})
+
+    def branch(self, values: Array) -> Array:
+        """Side of the elbow (n, 1) at angles (n, 2)."""
+        return elbow(values)[:, None]
 
 
 class InverseSolution(NamedTuple):
@@ -57,12 +87,6 @@ class InverseSolution(NamedTuple):
     def reached(self) -> NDArray[np.bool_]:
         """Rows whose angles lie within the limits, (n,)."""
         return self.status == REACHED
-
-
-def forward(geometry: ArmGeometry, angles: Array) -> Array:
-    """Tip (n, 2) in m of the rigid arm at `angles` (n, 2) in rad."""
-    angles = np.atleast_2d(angles)
-    return flexible_forward(geometry, angles, np.zeros((len(angles), 6)))
 
 
 def flexible_forward(geometry: ArmGeometry, angles: Array, deformation: Array) -> Array:

@@ -90,7 +90,7 @@ class Equilibria(NamedTuple):
     """Static equilibria of n samples; NaN where none was found.
 
     tip : (n, 2) in m.
-    deformation : (n, 6) in m and rad, columns mechanisms.elastic_arm.DEFORMATION.
+    deformation : (n, 6) in m and rad, columns kinematics.elastic_arm.DEFORMATION.
     station_deflection : (n, 2) in m, across each link at its deflection station.
     axial_strain : (n, 2) of each link at its strain station.
     """

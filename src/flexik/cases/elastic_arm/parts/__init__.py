@@ -1,0 +1,1 @@
+"""What is computed of the elastic arm, stage by stage."""

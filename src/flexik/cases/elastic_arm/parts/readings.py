@@ -1,0 +1,78 @@
+"""The readings of the experiment: poses, payloads, what the model has there, and their division."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexik.cases.elastic_arm.section import DegreeAxis, Samples
+from flexik.datasets.tables import Field
+
+Array = NDArray[np.float64]
+
+TRAINING, SELECTION, HELD_OUT = "training", "selection", "held_out"
+ANGLES = ("theta_1", "theta_2")
+
+FIELDS = (
+    Field("theta_1", "rad", "angle of joint 1"),
+    Field("theta_2", "rad", "angle of joint 2"),
+    Field("payload", "kg", "point mass at the tip"),
+    Field("part", "1", "training, selection or held_out", "string"),
+    Field("rigid_x", "m", "tip of the rigid arm, forward"),
+    Field("rigid_y", "m", "tip of the rigid arm, upward"),
+    Field("tip_x", "m", "tip of the flexible model, forward"),
+    Field("tip_y", "m", "tip of the flexible model, upward"),
+    *(
+        Field(f"{name}_{link}", unit, f"{meaning} link {link}, of the model")
+        for link in (1, 2)
+        for name, unit, meaning in (
+            ("dy", "m", "deflection across the end of"),
+            ("dx", "m", "displacement along the end of"),
+            ("dphi", "rad", "rotation of the end of"),
+        )
+    ),
+    *(
+        Field(f"station_deflection_{link}", "m", f"deflection at gauge 3 of link {link}")
+        for link in (1, 2)
+    ),
+    *(
+        Field(f"axial_strain_{link}", "1", f"at the pair of gauges of link {link}")
+        for link in (1, 2)
+    ),
+)
+
+
+def degree_axis(axis: DegreeAxis) -> Array:
+    """Angles (k,) in rad, both ends included."""
+    n = round((axis.maximum - axis.minimum) / axis.increment) + 1
+    return np.radians(np.linspace(axis.minimum, axis.maximum, n))
+
+
+def poses(samples: Samples) -> tuple[Array, Array]:
+    """Angles (n, 2) in rad and payload (n,) in kg of all readings.
+
+    As in the experiment: theta_2 runs first, then theta_1, then the payload.
+    """
+    payload, theta_1, theta_2 = np.meshgrid(
+        samples.payloads,
+        degree_axis(samples.theta_1_degrees),
+        degree_axis(samples.theta_2_degrees),
+        indexing="ij",
+    )
+    return np.column_stack([theta_1.ravel(), theta_2.ravel()]), payload.ravel()
+
+
+def divide(n: int, selection_share: float, held_out_share: float, seed: int) -> NDArray[np.str_]:
+    """Part (n,) of every reading: shares drawn at random, rounded to whole readings."""
+    order = np.random.default_rng(seed).permutation(n)
+    n_held_out, n_selection = round(held_out_share * n), round(selection_share * n)
+    part = np.full(n, TRAINING, dtype="<U9")
+    part[order[:n_held_out]] = HELD_OUT
+    part[order[n_held_out : n_held_out + n_selection]] = SELECTION
+    return part
+
+
+def columns_of(arrays: Sequence[NDArray], fields: Sequence[Field]) -> Mapping[str, NDArray]:
+    """Columns by name of `arrays`, each (n,) or (n, k), in the order of `fields`."""
+    flat = [column for array in arrays for column in (array.T if array.ndim == 2 else [array])]
+    return {field.name: column for field, column in zip(fields, flat, strict=True)}

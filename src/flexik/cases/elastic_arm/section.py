@@ -1,0 +1,290 @@
+"""The section `elastic_arm` of params.yaml, and the machine file beside it."""
+
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from flexik.parameters.conditions import RandomTargets, check_different
+from flexik.parameters.model import (
+    Interval,
+    Model,
+    Name,
+    NotNegative,
+    Positive,
+    Seed,
+    check_increase,
+)
+from flexik.parameters.networks import Axis, check_networks
+from flexik.parameters.networks import Network as AnyNetwork
+from flexik.parameters.trainers import Trainer
+from flexik.positioning import method, registry
+
+Pair = tuple[Positive, Positive]
+Triple = tuple[float, float, float]
+# From wood to diamond, Pa; and what a link of half a metre could carry, kg
+Stiffness = Annotated[float, Field(ge=1e10, le=1.2e12)]
+Payload = Annotated[float, Field(ge=0, le=100)]
+# Below a straight angle either way
+Degrees = Annotated[float, Field(gt=-180, lt=180)]
+Share = Annotated[float, Field(gt=0, lt=1)]
+
+# Prefixes of metrics that are no network or method
+TAKEN_NAMES = ("readings", "select", "splits")
+
+MAXIMUM_READINGS = 20_000
+# Fewest readings of a part: an R needs several
+MINIMUM_PART = 5
+
+
+class Geometry(Model):
+    """Lengths and joint limits."""
+
+    lengths: Pair
+    theta_1_degrees: tuple[Degrees, Degrees]
+    theta_2_degrees: tuple[Degrees, Degrees]
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        check_increase(self, "theta_1_degrees", "theta_2_degrees")
+        return self
+
+
+class Tube(Model):
+    """Section of both links."""
+
+    width: Positive
+    height: Positive
+    wall: Positive
+
+    @model_validator(mode="after")
+    def _hollow(self) -> Self:
+        if 2 * self.wall >= min(self.width, self.height):
+            raise ValueError("wall: leaves nothing of the tube hollow")
+        return self
+
+
+class Structure(Model):
+    """What bends and weighs, see multibody.elastic_arm.FlexibleArm."""
+
+    tube: Tube
+    youngs_modulus: Stiffness
+    density: Positive
+    joint_mass: NotNegative
+    gravity: Positive
+    n_elements: Annotated[int, Field(ge=1, le=200)]
+
+
+class Gauges(Model):
+    """Strain gauges, see parts/gauges.py."""
+
+    deflection_stations: Pair
+    strain_stations: Pair
+    slopes: tuple[Triple, Triple]
+    intercepts: tuple[Triple, Triple]
+    noise: NotNegative
+    voltage_range: Interval
+    resolution: NotNegative
+    strain_noise: NotNegative
+    strain_resolution: NotNegative
+
+    @model_validator(mode="after")
+    def _sloping(self) -> Self:
+        check_increase(self, "voltage_range")
+        for number, slopes in enumerate(self.slopes):
+            if 0.0 in slopes:
+                raise ValueError(f"slopes.{number}: a gauge of slope zero tells no deflection")
+        return self
+
+
+class Machine(Model):
+    """The machine file."""
+
+    geometry: Geometry
+    structure: Structure
+    gauges: Gauges
+
+    @model_validator(mode="after")
+    def _on_the_links(self) -> Self:
+        for name in ("deflection_stations", "strain_stations"):
+            stations = getattr(self.gauges, name)
+            for number, (station, length) in enumerate(
+                zip(stations, self.geometry.lengths, strict=True)
+            ):
+                if station >= length:
+                    raise ValueError(f"gauges.{name}.{number}: beyond its link, {length} m")
+        return self
+
+
+class DegreeAxis(Axis):
+    """Evenly spaced angles."""
+
+    minimum: Degrees
+    maximum: Degrees
+
+
+class Samples(Model):
+    """Poses and payloads of the readings, their division, and the seed of the gauges' noise."""
+
+    theta_1_degrees: DegreeAxis
+    theta_2_degrees: DegreeAxis
+    payloads: Annotated[list[Payload], Field(min_length=1)]
+    selection_share: Share
+    held_out_share: Share
+    seed: Seed
+    noise_seed: Seed
+
+    @model_validator(mode="after")
+    def _divided(self) -> Self:
+        if self.selection_share + self.held_out_share >= 1.0:
+            raise ValueError("held_out_share: leaves no reading to train with")
+        check_different("payloads", self.payloads)
+        if self.n_readings > MAXIMUM_READINGS:
+            raise ValueError(
+                f"theta_1_degrees.increment, theta_2_degrees.increment: {self.n_readings} "
+                f"readings, at most {MAXIMUM_READINGS}"
+            )
+        n, least = self.n_readings, MINIMUM_PART
+        held_out, selection = round(self.held_out_share * n), round(self.selection_share * n)
+        for key, part in (("held_out_share", held_out), ("selection_share", selection)):
+            if part < least:
+                raise ValueError(f"{key}: {part} of {n} readings, expected {least} or more")
+        if n - held_out - selection < least:
+            raise ValueError(
+                f"selection_share, held_out_share: leave {n - held_out - selection} of {n} "
+                f"readings to train with, expected {least} or more"
+            )
+        return self
+
+    @property
+    def n_readings(self) -> int:
+        """Number of readings: every pair of angles with every payload."""
+        return self.theta_1_degrees.n_values * self.theta_2_degrees.n_values * len(self.payloads)
+
+
+class Network(AnyNetwork):
+    """A network; `readings` tells what the gauges show that it learns from, see parts/gauges.py."""
+
+    corrects: None = None
+    learns: Literal[
+        "gauges", "gauges_without_dx", "gauges_elbow", "deflection", "coordinates", "tip"
+    ]
+    readings: Literal["noise_free", "noisy", "noisy_voltages"] = "noise_free"
+
+    @property
+    def has_gauges(self) -> bool:
+        """Whether it is given gauges."""
+        return self.learns.startswith("gauges")
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if not self.has_gauges and self.readings != "noise_free":
+            raise ValueError("readings: of networks that are given gauges")
+        return self
+
+
+class Gauge(method.Settings):
+    """Settings of method `gauges`, see parts/gauge_method.py."""
+
+    needs: ClassVar[str | None] = "gauges"
+    method: Literal["gauges"]
+
+
+if TYPE_CHECKING:
+    AnyMethod = method.Settings
+else:
+    AnyMethod = Annotated[Gauge | registry.AnyMethod, Field(discriminator="method")]
+
+
+class Splits(Model):
+    """Other divisions of the readings, by which one network is trained and judged again."""
+
+    network: Name
+    seeds: Annotated[list[Seed], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _once(self) -> Self:
+        check_different("seeds", self.seeds)
+        return self
+
+
+class Studies(Model):
+    """What varies one thing.
+
+    payload_error : kg more told than there is, to see what it costs.
+    """
+
+    splits: Splits
+    payload_error: Positive
+
+
+class Section(Model):
+    """The elastic two-link arm."""
+
+    machine: Machine
+    trainers: dict[Name, Trainer]
+    samples: Samples
+    networks: dict[Name, Network]
+    conditions: dict[Name, RandomTargets]
+    methods: dict[Name, AnyMethod]
+    studies: Studies
+
+    @property
+    def gauge_networks(self) -> dict[str, Network]:
+        """Networks that are given gauges, by name."""
+        return {name: network for name, network in self.networks.items() if network.has_gauges}
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        check_networks(self.networks, self.trainers)
+        self._check_ranges()
+        self._check_splits()
+        self._check_methods()
+        return self
+
+    def _check_ranges(self) -> None:
+        for name in ("theta_1_degrees", "theta_2_degrees"):
+            axis, (low, high) = getattr(self.samples, name), getattr(self.machine.geometry, name)
+            if axis.minimum < low or axis.maximum > high:
+                raise ValueError(f"samples.{name}: beyond the joint, {low} to {high}")
+        least, most = min(self.samples.payloads), max(self.samples.payloads)
+        for name, drawn in self.conditions.items():
+            if name == "readings":
+                raise ValueError(f"conditions.{name}: the name is taken")
+            if drawn.payload[0] < least or drawn.payload[1] > most:
+                raise ValueError(
+                    f"conditions.{name}.payload: beyond those of the readings, {least:g} to "
+                    f"{most:g} kg"
+                )
+
+    def _check_splits(self) -> None:
+        network = self.networks.get(self.studies.splits.network)
+        if network is None or network.learns != "gauges" or network.is_selected:
+            raise ValueError(
+                f"studies.splits.network: {self.studies.splits.network!r}, expected a network of "
+                "given size that learns gauges, the published idea"
+            )
+        if self.samples.seed in self.studies.splits.seeds:
+            raise ValueError("studies.splits.seeds: holds samples.seed, the main division")
+
+    def _check_methods(self) -> None:
+        if not any(given.method == "none" for given in self.methods.values()):
+            raise ValueError("methods: none is not there, which the others are compared with")
+        for label, given in self.methods.items():
+            network = self.networks.get(given.network or "")
+            if given.needs is None:
+                continue
+            if network is None:
+                raise ValueError(
+                    f"methods.{label}.network: there is no network {given.network!r} "
+                    f"({', '.join(self.networks)})"
+                )
+            if given.needs != ("gauges" if network.has_gauges else network.learns):
+                raise ValueError(
+                    f"methods.{label}.network: {given.network!r} learns {network.learns}, "
+                    f"{given.method} needs {given.needs}"
+                )
+            if label in self.networks and given.network != label:
+                raise ValueError(f"methods.{label}: the name of another network than its own")
+        for name in (*self.networks, *self.methods):
+            if name in TAKEN_NAMES:
+                raise ValueError(f"methods.{name}: the name is taken")

@@ -1,1 +1,0 @@
-"""The flexible two-link arm."""

@@ -1,1 +1,0 @@
-"""Positioning of the elastic arm."""
