@@ -1,0 +1,1 @@
+"""The measured crane: campaign, error budget, identification and adaptation."""

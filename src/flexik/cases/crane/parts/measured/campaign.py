@@ -1,0 +1,85 @@
+"""The campaign: a crane is measured without and with compensation (thesis, chapter 4.6).
+
+A crane as built is measured, or the campaign of a CSV file is taken. What a campaign in a file does
+not have, targets and methods or strokes, is NaN and no text.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from flexik.cases.crane.measured_section import Campaign
+from flexik.cases.crane.parts.crane import flexible
+from flexik.cases.crane.parts.measured.campaign_file import own_campaign
+from flexik.cases.crane.parts.measured.fields import CAMPAIGN
+from flexik.cases.crane.parts.measured.nominal import (
+    commanded,
+    compensating,
+    read_network,
+    uncompensated,
+)
+from flexik.cases.crane.parts.measured.twins import measured_tips, twin_and_generator
+from flexik.datasets.parts import Work, Writer, table, whole
+from flexik.evaluation.conditions import every
+from flexik.kinematics.crane_manipulator import geometry_of
+from flexik.machines.crane import Machine
+from flexik.multibody.crane.as_built import Magnitudes
+from flexik.multibody.crane.structure import FlexibleCrane
+from flexik.positioning import combined
+from flexik.positioning.method import Array, Network
+
+
+def prepare_own(*, machine: Machine, file: Path) -> Work:
+    """The campaign of `file`."""
+    found = own_campaign(file, geometry_of(machine))
+    columns = {field.name: found[field.name].to_numpy() for field in CAMPAIGN}
+    return whole(written, columns=columns)
+
+
+def prepare(
+    *,
+    machine: Machine,
+    campaign: Campaign,
+    method: combined.Settings,
+    network: Path,
+    spring: Path,
+    sections: object,
+) -> Work:
+    """The campaign on a crane as built; `sections`, tables of the beams, are named by `machine`."""
+    crane = flexible(machine, spring)
+    strokes, query = approaches(crane, method, read_network(network), campaign)
+    return whole(measure, crane=crane, campaign=campaign, strokes=strokes, query=query)
+
+
+def approaches(
+    crane: FlexibleCrane, method: combined.Settings, network: Network, campaign: Campaign
+) -> tuple[dict[str, Array], Array]:
+    """Strokes (n, 3) commanded by each of fields.METHODS at the query (n, 3) of the campaign."""
+    query, _ = every(campaign.points, campaign.payloads)
+    methods = {"none": uncompensated(crane), "combined": compensating(crane, method, network)}
+    return commanded(crane, methods, query), query
+
+
+def measure(
+    *, crane: FlexibleCrane, campaign: Campaign, strokes: Mapping[str, Array], query: Array
+) -> Mapping[str, Writer]:
+    """The table of the campaign on a crane as built."""
+    magnitudes = Magnitudes(**campaign.deviations.model_dump())
+    twin, generator = twin_and_generator(crane, magnitudes, campaign.seed)
+    tips = measured_tips(twin, strokes, query[:, 2], campaign.noise, generator)
+    n = len(query)
+    numbers = np.vstack([np.hstack([query, strokes[name], tips[name]]) for name in strokes])
+    names = (field.name for field in CAMPAIGN[2:])
+    columns = {
+        "line": np.arange(1, len(numbers) + 1),
+        "method": np.repeat(list(strokes), n),
+        **dict(zip(names, numbers.T, strict=True)),
+    }
+    return written(columns=columns)
+
+
+def written(*, columns: Mapping[str, Array]) -> Mapping[str, Writer]:
+    """The table of `columns`."""
+    print(f"{len(columns['line'])} measurements")
+    return {".parquet": table(columns, CAMPAIGN)}
