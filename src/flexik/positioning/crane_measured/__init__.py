@@ -1,1 +1,0 @@
-"""Correcting the compensator of the crane by measurements."""
