@@ -113,7 +113,7 @@ def check(frame: pd.DataFrame, columns: Columns) -> None:
     outside = (answers < np.array(columns.lower) - LIMIT_TOLERANCE) | (
         answers > np.array(columns.upper) + LIMIT_TOLERANCE
     )
-    wrong = {
+    wrong: dict[str, pd.DataFrame] = {
         "query not finite": ~np.isfinite(frame[[field.name for field in columns.query]]),
         "status unknown": ~frame[[STATUS.name]].isin(list(STATUS_MEANING)),
         "answer not finite": ~np.isfinite(answers[reached]),

@@ -1,4 +1,4 @@
-"""Random targets that the loaded, flexible manipulator can reach, with the strokes that do it."""
+"""Random targets that the loaded, flexible machine can reach, with the coordinates that do it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from flexik.errors import ParameterError
 from flexik.evaluation.conditions import Array
-from flexik.evaluation.errors import FlexibleTip
-from flexik.positioning.method import REACHED, checked
-from flexik.positioning.rigid_inverse import RigidInverse
+from flexik.kinematics.manipulator import Manipulator
+from flexik.kinematics.status import REACHED
+from flexik.positioning.method import checked
 
-RigidTip = Callable[[Array], Array]
+FlexibleTip = Callable[[Array, Array], Array]
 
 TOLERANCE = 1e-6  # m
 N_ITERATIONS = 20  # 95 % of the targets of the crane take five or fewer
@@ -25,30 +25,30 @@ class Targets:
 
     targets : (n, 2) in m.
     payload : (n,) in kg.
-    strokes : (n, k) in m or rad, which put the loaded tip on the targets.
+    values : (n, k) actuator coordinates in m or rad, which put the loaded tip on the targets.
     """
 
     targets: Array
     payload: Array
-    strokes: Array
+    values: Array
 
     def __post_init__(self) -> None:
         checked("targets", self.targets, None, 2)
         checked("payload", self.payload, len(self.targets))
-        checked("strokes", self.strokes, len(self.targets), None)
+        checked("values", self.values, len(self.targets), None)
 
     def __len__(self) -> int:
         return len(self.targets)
 
 
 class TargetSolution(NamedTuple):
-    """Strokes (n, k), whether they reach (n,), and how far off the loaded tip is (n,) in m.
+    """Coordinates (n, k), whether they reach (n,), and how far off the loaded tip is (n,) in m.
 
     A residual of NaN marks rows where the inverse or the equilibrium failed; a finite one of a row
-    that is not reached, rows that did not converge. Those rows hold the strokes of their last pass.
+    that is not reached, rows that did not converge. Those rows hold the values of their last pass.
     """
 
-    strokes: Array
+    values: Array
     reached: NDArray[np.bool_]
     residual: Array
 
@@ -93,18 +93,16 @@ def draw_candidates(
 def solve_targets(
     targets: Array,
     payload: Array,
-    inverse: RigidInverse,
-    rigid_tip: RigidTip,
+    manipulator: Manipulator,
     flexible_tip: FlexibleTip,
     tolerance: float = TOLERANCE,
     n_iterations: int = N_ITERATIONS,
-    n_strokes: int = 3,
 ) -> TargetSolution:
-    """Strokes that put the loaded tip on `targets`, by fixed-point iteration of the deflection.
+    """Coordinates that put the loaded tip on `targets`, by fixed-point iteration of the deflection.
 
     The rigid inverse is asked for the target minus the deflection of the last pass, zero at first.
     The deflection changes by a few percent of a change of the tip, so that each pass gains one to
-    two digits. A target that the rigid crane does not reach counts as not reached, although the
+    two digits. A target that the rigid machine does not reach counts as not reached, although the
     loaded one may sag onto it: every method starts from the rigid inverse.
 
     Parameters
@@ -113,18 +111,15 @@ def solve_targets(
         (n, 2) in m.
     payload
         (n,) in kg.
-    inverse
-        Rigid inverse; one that treats each row alone makes each row of the result independent.
-    rigid_tip
-        Tip (n, 2) in m of the rigid manipulator at strokes (n, k).
+    manipulator
+        One whose inverse treats each row alone makes each row of the result independent.
     flexible_tip
-        The same of the flexible one under payload (n,) in kg; NaN where it has no equilibrium.
+        Tip (n, 2) in m of the flexible machine at coordinates (n, k) under payload (n,) in kg; NaN
+        where it has no equilibrium.
     tolerance
         Accepted distance between loaded tip and target, in m.
     n_iterations
         Passes at most.
-    n_strokes
-        Number of actuator coordinates, k.
 
     Raises
     ------
@@ -133,36 +128,36 @@ def solve_targets(
     """
     targets = checked("targets", targets, None, 2)
     payload = checked("payload", payload, len(targets))
-    strokes, deflection = np.zeros((len(targets), n_strokes)), np.zeros(targets.shape)
+    values, deflection = np.zeros((len(targets), len(manipulator.lower))), np.zeros(targets.shape)
     residual = np.full(len(targets), np.nan)
     rows = np.arange(len(targets))
     for _ in range(n_iterations):
-        solution = inverse(targets[rows] - deflection[rows], strokes[rows], targets[rows])
+        solution = manipulator.inverse(
+            targets[rows] - deflection[rows], values[rows], targets[rows]
+        )
         solved = solution.status == REACHED
         residual[rows[~solved]] = np.nan
         rows = rows[solved]
         if not rows.size:
             break
-        strokes[rows] = solution.strokes[solved]
-        tip = flexible_tip(strokes[rows], payload[rows])
-        deflection[rows] = tip - rigid_tip(strokes[rows])
+        values[rows] = solution.values[solved]
+        tip = flexible_tip(values[rows], payload[rows])
+        deflection[rows] = tip - manipulator.forward(values[rows])
         residual[rows] = np.linalg.norm(tip - targets[rows], axis=1)
         rows = rows[residual[rows] >= tolerance]  # NaN leaves too
-    return TargetSolution(strokes, residual < tolerance, residual)
+    return TargetSolution(values, residual < tolerance, residual)
 
 
 def reachable_targets(
     targets: Array,
     payload: Array,
-    inverse: RigidInverse,
-    rigid_tip: RigidTip,
+    manipulator: Manipulator,
     flexible_tip: FlexibleTip,
     tolerance: float = TOLERANCE,
     n_iterations: int = N_ITERATIONS,
-    n_strokes: int = 3,
 ) -> Targets:
     """Those of `targets` that `solve_targets` reaches, in their order; see there."""
-    strokes, reached, _ = solve_targets(
-        targets, payload, inverse, rigid_tip, flexible_tip, tolerance, n_iterations, n_strokes
+    values, reached, _ = solve_targets(
+        targets, payload, manipulator, flexible_tip, tolerance, n_iterations
     )
-    return Targets(targets[reached], payload[reached], strokes[reached])
+    return Targets(targets[reached], payload[reached], values[reached])

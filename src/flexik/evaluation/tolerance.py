@@ -1,63 +1,47 @@
-"""Positioning errors of an iterative method by the tolerance that ends its iteration.
+"""Errors and iterations of an iterative method, as tolerance studies tell them.
 
 As in Rouvinen 1999, chapters 4.2 and 4.3.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Mapping
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
+from flexik.datasets.tables import Field
 from flexik.errors import DataError
-from flexik.evaluation.conditions import Array, Conditions
-from flexik.evaluation.errors import FlexibleTip, evaluate, statistics
-from flexik.positioning.method import Method
+from flexik.evaluation.errors import statistics
+
+FIELDS = (
+    Field("method", "1", "name of the method", "string"),
+    Field("tolerance", "1", "half the sum of squared normalised errors at which a search ends"),
+    Field("mean_error", "m", "over all test conditions"),
+    Field("max_error", "m", "over all test conditions"),
+    Field("mean_iterations", "1", "of the search"),
+    Field("max_iterations", "1", "of the search", "int64"),
+    Field("n_failed", "1", "searches that ended above their tolerance", "int64"),
+)
 
 
-def tolerance_study(
-    method_of: Callable[[float], Method],
-    tolerances: Iterable[float],
-    conditions: Conditions,
-    initial_strokes: Array,
-    flexible_tip: FlexibleTip,
-) -> pd.DataFrame:
-    """Errors and iterations of `method_of(tolerance)` over `conditions`, for each tolerance.
+def tolerance_row(
+    method: str, tolerance: float, table: Mapping[str, NDArray]
+) -> dict[str, NDArray]:
+    """One row of FIELDS from the `table` of `evaluate`; failed conditions count in all of it.
 
-    Parameters
-    ----------
-    method_of
-        Method with a given tolerance; its diagnostics have `n_iterations`, whole numbers.
-    tolerances
-        In the method's own unit.
-    conditions, initial_strokes, flexible_tip
-        As `flexik.evaluation.errors.evaluate` takes them.
-
-    Returns
-    -------
-    DataFrame
-        A row a tolerance: tolerance, mean_error and max_error in m, mean_iterations,
-        max_iterations, n_failed. Failed conditions count in all of them.
-
-    Raises
-    ------
-    DataError
-        If the diagnostics have no whole numbers `n_iterations`.
-    PositioningError
-        As `evaluate`.
+    Raises DataError if the method has no diagnostics `n_iterations` of whole numbers.
     """
-    rows = []
-    for tolerance in tolerances:
-        frame = evaluate(method_of(tolerance), conditions, initial_strokes, flexible_tip)
-        if "n_iterations" not in frame or frame["n_iterations"].dtype.kind != "i":
-            raise DataError(f"method with {tolerance=}: expected whole diagnostics n_iterations")
-        found = statistics(frame)
-        rows.append(
-            {
-                "tolerance": tolerance,
-                "mean_error": found["mean_error"],
-                "max_error": found["max_error"],
-                "mean_iterations": float(frame["n_iterations"].mean()),
-                "max_iterations": int(frame["n_iterations"].max()),
-                "n_failed": found["n_failed"],
-            }
-        )
-    return pd.DataFrame(rows)
+    iterations = table.get("n_iterations")
+    if iterations is None or iterations.dtype.kind != "i":
+        raise DataError(f"method {method} with {tolerance=}: expected whole n_iterations")
+    found = statistics(pd.DataFrame(table))
+    row = (
+        method,
+        tolerance,
+        found["mean_error"],
+        found["max_error"],
+        float(iterations.mean()),
+        int(iterations.max()),
+        found["n_failed"],
+    )
+    return {field.name: np.array([value]) for field, value in zip(FIELDS, row, strict=True)}

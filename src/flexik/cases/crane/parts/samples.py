@@ -1,7 +1,8 @@
-"""Samples of the crane: the grid of table 4.1 and a random set, in static equilibrium."""
+"""Samples of the crane in static equilibrium: the grid of table 4.1 and a random set."""
 
 import functools
-from collections.abc import Sequence
+import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -10,35 +11,91 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from flexik.datasets.parallel import ParallelSettings, parallel_map
-from flexik.datasets.resumable import compute_table
-from flexik.datasets.tables import Field
-from flexik.errors import ParameterError
+from flexik.cases.crane.parts.crane import flexible, model_inputs
+from flexik.cases.crane.parts.fields import FAILED, INPUTS, KEPT, LEFT_OUT, SAMPLE_FIELDS
+from flexik.cases.crane.section import Grid, Section, Selection
+from flexik.datasets.parts import Part, Work, Writer, stacked, table
+from flexik.errors import ParameterError, SolverError
 from flexik.kinematics.crane import CraneGeometry, forward
-from flexik.multibody.crane.model import FlexibleCrane, solve, tips
+from flexik.kinematics.crane_manipulator import geometry_of
+from flexik.machines.crane import Machine
+from flexik.multibody.crane.model import solve
+from flexik.multibody.crane.structure import FlexibleCrane
 
 Array = NDArray[np.float64]
 
-KEPT, LEFT_OUT, FAILED = 0, 1, 2
-FIELDS = (
-    Field("lift_stroke", "m", "stroke of the lift cylinder"),
-    Field("jib_stroke", "m", "stroke of the jib cylinder"),
-    Field("extension_stroke", "m", "stroke of the extension cylinder"),
-    Field("payload", "kg", "point mass at the tip"),
-    Field("rigid_x", "m", "tip of the rigid crane, forward of the slew axis"),
-    Field("rigid_y", "m", "tip of the rigid crane, above ground"),
-    Field("tip_x", "m", "tip in static equilibrium; NaN where not solved"),
-    Field("tip_y", "m", "tip in static equilibrium; NaN where not solved"),
-    Field("status", "1", "0 kept, 1 left out (rigid tip behind the limit), 2 failed", "int64"),
-)
-STROKES = ("lift_stroke", "jib_stroke", "extension_stroke")
-INPUTS = (*STROKES, "payload")
-
-# Poses in a part: large enough to pay for one model, small enough to share out and to lose
+# Poses in an item: large enough to pay for one model, small enough to share out and to lose
 POSES_PER_PART = 27
 
 # Times the wanted number of samples is drawn before giving up
 MAXIMUM_DRAWS = 100
+SHOWN_FAILURES = 10
+
+
+def parts(section: Section) -> list[Part]:
+    """`grid` and `selection`, tables of SAMPLE_FIELDS."""
+    given = section.samples
+    settings = {
+        "machine": section.machine,
+        "minimum_tip_x": given.minimum_tip_x,
+        "maximum_failed_share": given.maximum_failed_share,
+    }
+    inputs = model_inputs(section)
+    return [
+        Part("grid", prepare_grid, {**settings, "grid": given.grid}, inputs),
+        Part("selection", prepare_selection, {**settings, "selection": given.selection}, inputs),
+    ]
+
+
+def prepare_grid(
+    *,
+    machine: Machine,
+    minimum_tip_x: float,
+    maximum_failed_share: float,
+    grid: Grid,
+    spring: Path,
+    sections: dict[str, Path],
+) -> Work:
+    """The training grid, in pieces of equal extension."""
+    pieces = GridParts(**{name: axis(**dict(getattr(grid, name))) for name in GridParts.AXES})
+    function = functools.partial(solve_samples, flexible(machine, spring), minimum_tip_x)
+    return Work(function, pieces, functools.partial(_finish, "grid", maximum_failed_share))
+
+
+def prepare_selection(
+    *,
+    machine: Machine,
+    minimum_tip_x: float,
+    maximum_failed_share: float,
+    selection: Selection,
+    spring: Path,
+    sections: dict[str, Path],
+) -> Work:
+    """The random set."""
+    given = selection.n_samples, selection.payload, minimum_tip_x, selection.seed
+    drawn = random_samples(geometry_of(machine), *given)
+    function = functools.partial(solve_samples, flexible(machine, spring), minimum_tip_x)
+    finish = functools.partial(_finish, "selection", maximum_failed_share)
+    return Work(function, split(drawn), finish)
+
+
+def _finish(
+    name: str, maximum_failed_share: float, results: list[Mapping[str, NDArray]]
+) -> Mapping[str, Writer]:
+    """Print the counts and the failed samples; raises SolverError if there are too many."""
+    columns = stacked(results, SAMPLE_FIELDS)
+    frame = pd.DataFrame(columns)
+    n = counts(frame)
+    print(f"{name}: " + ", ".join(f"{key} {value}" for key, value in n.items()))
+    failed = failed_samples(frame)
+    for line in failed[:SHOWN_FAILURES]:
+        print(f"{name}: no static equilibrium at {line}", file=sys.stderr)
+    if n["n_failed"] > maximum_failed_share * n["n_samples"]:
+        raise SolverError(
+            f"{n['n_failed']} of {n['n_samples']} samples failed, more than "
+            f"crane.samples.maximum_failed_share {maximum_failed_share:g}; first: {failed[0]}"
+        )
+    return {".parquet": table(columns, SAMPLE_FIELDS)}
 
 
 @dataclass(frozen=True)
@@ -118,7 +175,7 @@ def random_samples(
             break
     else:
         raise ParameterError(
-            f"crane.grid.minimum_tip_x: hardly any pose has its tip at x >= {minimum_tip_x} m"
+            f"crane.samples.minimum_tip_x: hardly any pose has its tip at x >= {minimum_tip_x} m"
         )
     return Samples(strokes[:n_samples], rng.uniform(*payload, n_samples))
 
@@ -130,7 +187,7 @@ def split(samples: Samples, n_rows: int = 400) -> list[Samples]:
 
 
 def solve_samples(crane: FlexibleCrane, minimum_tip_x: float, samples: Samples) -> dict[str, Array]:
-    """Columns FIELDS of `samples`; one that is left out or fails is a row with its status."""
+    """SAMPLE_FIELDS of `samples`; one that is left out or fails is a row with its status."""
     rigid = forward(crane.geometry, samples.strokes)
     # a linkage that does not close has no rigid tip: that fails, it is not left out
     kept = ~(rigid[:, 0] < minimum_tip_x)
@@ -140,54 +197,7 @@ def solve_samples(crane: FlexibleCrane, minimum_tip_x: float, samples: Samples) 
     tips[rows], failures = solve(crane, samples.strokes[rows], samples.payload[rows])
     status[rows[list(failures)]] = FAILED
     columns = [*samples.strokes.T, samples.payload, *rigid.T, *tips.T, status]
-    return {field.name: column for field, column in zip(FIELDS, columns, strict=True)}
-
-
-def parallel_tips(
-    crane: FlexibleCrane,
-    strokes: Array,
-    payload: Array,
-    settings: ParallelSettings,
-    description: str = "",
-) -> Array:
-    """Tip (n, 2) in m at `strokes` (n, 3) in m under `payload` (n,) in kg, in parallel.
-
-    Raises the SolverError of the first row without equilibrium.
-    """
-    # rows of equal extension share a system
-    order = np.lexsort((payload, *strokes.T))
-    parts = split(Samples(strokes[order], payload[order]))
-    solved = parallel_map(functools.partial(_tips, crane), parts, settings, description)
-    result = np.empty((len(strokes), 2))
-    result[order] = np.concatenate([np.empty((0, 2)), *solved])
-    return result
-
-
-def _tips(crane: FlexibleCrane, samples: Samples) -> Array:
-    return tips(crane, samples.strokes, samples.payload)
-
-
-def generate(
-    path: Path | str,
-    crane: FlexibleCrane,
-    parts: Sequence[Samples],
-    minimum_tip_x: float,
-    parameters_checksum: str,
-    key: str,
-    settings: ParallelSettings,
-    description: str,
-) -> int:
-    """Solve all `parts` in parallel into the Parquet table `path`; see `compute_table`.
-
-    Unfinished work lies in a hidden folder beside `path`. Returns the number of parts that an
-    interrupted run had finished.
-    """
-    path = Path(path)
-    function = functools.partial(solve_samples, crane, minimum_tip_x)
-    folder = path.parent / f".{path.stem}_parts"
-    return compute_table(
-        path, function, parts, FIELDS, parameters_checksum, key, settings, description, folder
-    )
+    return {field.name: column for field, column in zip(SAMPLE_FIELDS, columns, strict=True)}
 
 
 def counts(table: pd.DataFrame) -> dict[str, int]:
@@ -205,14 +215,3 @@ def failed_samples(table: pd.DataFrame) -> list[str]:
     """Strokes and payload of each failed sample, in words."""
     rows = table.loc[table["status"] == FAILED, list(INPUTS)].to_numpy()
     return [f"strokes ({a:.6g}, {b:.6g}, {c:.6g}) m with {m:g} kg" for a, b, c, m in rows]
-
-
-def kept(table: pd.DataFrame) -> pd.DataFrame:
-    """Rows that were solved."""
-    return table[table["status"] == KEPT].reset_index(drop=True)
-
-
-def deflection(table: pd.DataFrame) -> Array:
-    """Flexible minus rigid tip (n, 2) in m."""
-    flexible, rigid = table[["tip_x", "tip_y"]], table[["rigid_x", "rigid_y"]]
-    return flexible.to_numpy() - rigid.to_numpy()

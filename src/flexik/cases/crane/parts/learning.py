@@ -10,9 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from flexik import parameters
-from flexik.datasets.crane.grid import FIELDS, STROKES, deflection, kept
-from flexik.datasets.crane.provenance import grid_checksum, selection_checksum
+from flexik.cases.crane.parts.fields import SAMPLE_FIELDS, STROKES, deflection, kept
 from flexik.datasets.tables import Field, read_table
 from flexik.kinematics.crane import CraneGeometry, forward, inverse
 
@@ -21,7 +19,7 @@ Array = NDArray[np.float64]
 # Strokes closer than this are the same, m
 _SAME_STROKES = 1e-6
 
-_COLUMNS = {field.name: field for field in FIELDS} | {
+_COLUMNS = {field.name: field for field in SAMPLE_FIELDS} | {
     field.name: field
     for field in (
         Field("deflection_x", "m", "flexible minus rigid tip"),
@@ -30,13 +28,6 @@ _COLUMNS = {field.name: field for field in FIELDS} | {
         Field("correction_y", "m", "flexible tip minus the rigid network's"),
     )
 }
-
-FITTING_FIELDS = (
-    Field("n_hidden", "1", "neurons in the hidden layer", "int64"),
-    Field("lift_stroke", "m", "stroke of the lift cylinder"),
-    Field("model_y", "m", "deflection, upwards, of the flexible model"),
-    Field("network_y", "m", "deflection, upwards, as the network has it"),
-)
 
 
 @dataclass(frozen=True)
@@ -58,12 +49,13 @@ def _fields(*names: str) -> tuple[Field, ...]:
     return tuple(_COLUMNS[name] for name in names)
 
 
+_STROKES_AND_PAYLOAD = _fields(*STROKES, "payload")
 KINDS = {
-    "deflection": Kind(_fields(*STROKES, "payload"), _fields("deflection_x", "deflection_y")),
-    "direct": Kind(_fields(*STROKES, "payload"), _fields("tip_x", "tip_y")),
-    "rigid": Kind(_fields(*STROKES), _fields("rigid_x", "rigid_y"), once_a_pose=True),
-    "correction": Kind(_fields(*STROKES, "payload"), _fields("correction_x", "correction_y")),
-    "inverse": Kind(
+    "deflection": Kind(_STROKES_AND_PAYLOAD, _fields("deflection_x", "deflection_y")),
+    "tip": Kind(_STROKES_AND_PAYLOAD, _fields("tip_x", "tip_y")),
+    "rigid_tip": Kind(_fields(*STROKES), _fields("rigid_x", "rigid_y"), once_a_pose=True),
+    "correction": Kind(_STROKES_AND_PAYLOAD, _fields("correction_x", "correction_y")),
+    "coordinates": Kind(
         _fields("tip_x", "tip_y", "payload", "extension_stroke"),
         _fields("lift_stroke", "jib_stroke"),
         one_branch=True,
@@ -94,29 +86,20 @@ class LearningData:
 
 
 def read_learning_data(
-    folder: Path,
-    crane: parameters.Crane,
-    spring_stiffness: float,
-    kind: str,
-    rigid: Predictor | None = None,
+    grid: Path, selection: Path, geometry: CraneGeometry, kind: str, rigid: Predictor | None = None
 ) -> LearningData:
-    """Data of a network of `kind` (one of KINDS) from the tables in `folder`.
+    """Data of a network of `kind` (one of KINDS) from the tables `grid` and `selection`.
 
     `rigid` is the trained rigid network that a correction corrects, its errors included
     (Rouvinen 1999, chapter 4.3); only kind `correction` needs it.
-    Raises DataError if a table is missing, damaged or made with other parameters.
     """
-    made_with = grid_checksum(crane, spring_stiffness)
-    grid = kept(read_table(folder / "grid.parquet", FIELDS, made_with))
-    made_with = selection_checksum(crane, spring_stiffness)
-    selection = kept(read_table(folder / "selection.parquet", FIELDS, made_with))
-    geometry = CraneGeometry(**crane.geometry.model_dump())
-    data = *_pair(grid, kind, geometry, rigid), *_pair(selection, kind, geometry, rigid)
+    tables = [kept(read_table(path, SAMPLE_FIELDS)) for path in (grid, selection)]
+    (inputs, outputs), chosen_by = (_pair(table, kind, geometry, rigid) for table in tables)
     judge = None
-    if kind == "inverse":
-        reach = np.ptp(kept(grid)[["tip_x", "tip_y"]].to_numpy(), axis=0) / 2.0
-        judge = functools.partial(stroke_error_at_tip, geometry, *data[2:], reach)
-    return LearningData(*data, judge)
+    if kind == "coordinates":
+        reach = np.ptp(tables[0][["tip_x", "tip_y"]].to_numpy(), axis=0) / 2.0
+        judge = functools.partial(stroke_error_at_tip, geometry, *chosen_by, reach)
+    return LearningData(inputs, outputs, *chosen_by, judge)
 
 
 def stroke_error_at_tip(
@@ -129,7 +112,7 @@ def stroke_error_at_tip(
 
     Parameters
     ----------
-    inputs : (n, 4) of kind `inverse`, the last one the extension, m
+    inputs : (n, 4) of kind `coordinates`, the last one the extension, m
     strokes : (n, 2) lift and jib, m
     reach : (2,) half the extent of the tips in x and y, m
     network : gives strokes (n, 2) at `inputs`
@@ -151,14 +134,6 @@ def on_branch(table: pd.DataFrame, geometry: CraneGeometry) -> NDArray[np.bool_]
     strokes = table[list(STROKES)].to_numpy()
     taken = inverse(geometry, table[["rigid_x", "rigid_y"]].to_numpy(), strokes[:, 2])
     return taken.reached & (np.abs(taken.strokes - strokes).max(axis=1) < _SAME_STROKES)
-
-
-def on_line(
-    table: pd.DataFrame, jib: float, extension: float, payload: float | None = None
-) -> NDArray[np.bool_]:
-    """Whether a row (n,) has these strokes, m, and this payload, kg, if any."""
-    on = np.isclose(table["jib_stroke"], jib) & np.isclose(table["extension_stroke"], extension)
-    return on if payload is None else on & np.isclose(table["payload"], payload)
 
 
 def learnt_rows(table: pd.DataFrame, kind: str, geometry: CraneGeometry) -> pd.DataFrame:

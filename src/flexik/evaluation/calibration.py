@@ -48,11 +48,11 @@ def fit_spring(
     try:
         ends = excess(low), excess(high)
     except SolverError as error:
-        raise ParameterError(f"crane.calibration.stiffness_range: at its ends {error}") from None
+        raise ParameterError(f"calibration.stiffness_range: at its ends {error}") from None
     if ends[0] * ends[1] > 0:
         found = " and ".join(f"{1e3 * (mean_error + end):.2f} mm" for end in ends)
         raise ParameterError(
-            f"crane.calibration.stiffness_range: mean errors of {found} at its ends "
+            f"calibration.stiffness_range: mean errors of {found} at its ends "
             f"do not enclose {1e3 * mean_error:.2f} mm"
         )
     # a compliance, so nearly linear in 1/k; brentq needs about eight evaluations

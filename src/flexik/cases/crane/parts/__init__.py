@@ -1,0 +1,1 @@
+"""What the case computes, a module a stage."""

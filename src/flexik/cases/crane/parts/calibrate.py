@@ -1,0 +1,62 @@
+"""The ground spring, so that the uncompensated mean error is the published one, or as it is known.
+
+`spring.json` holds the stiffness, and the statistics of the errors that it leaves.
+"""
+
+import functools
+from pathlib import Path
+
+import pandas as pd
+
+from flexik.cases.crane.parts.fields import columns_of
+from flexik.cases.crane.section import Calibration, Section
+from flexik.datasets.parts import Part, Work, Writer, json_file, whole
+from flexik.datasets.tables import read_csv
+from flexik.errors import DataError
+from flexik.evaluation.calibration import fit_spring
+from flexik.evaluation.conditions import Conditions, every
+from flexik.evaluation.errors import evaluate, statistics, tip_judge
+from flexik.kinematics.crane_manipulator import CraneManipulator, geometry_of
+from flexik.machines.crane import Machine
+from flexik.multibody.crane.assembly import flexible_crane
+from flexik.multibody.crane.model import tips
+from flexik.positioning.none import Uncompensated
+
+PUBLISHED = Path("data/reference/crane/positioning_errors.csv")
+
+
+def parts(section: Section) -> list[Part]:
+    """`spring`."""
+    settings = {"machine": section.machine, "calibration": section.calibration}
+    sections = section.machine.structure.beams.sections
+    return [Part("spring", prepare, settings, {"published": PUBLISHED, "sections": sections})]
+
+
+def prepare(
+    *, machine: Machine, calibration: Calibration, published: Path, sections: dict[str, Path]
+) -> Work:
+    """Fit the spring, or take the known one."""
+    return whole(_spring, machine=machine, calibration=calibration, published=published)
+
+
+def _spring(machine: Machine, calibration: Calibration, published: Path) -> dict[str, Writer]:
+    if calibration.stiffness is not None:
+        print(f"ground spring {calibration.stiffness:.6g} N m/rad, as given")
+        return {".json": json_file({"spring_stiffness": calibration.stiffness})}
+    table = read_csv(published, ("none",), ("statistic",)).set_index("statistic")["none"]
+    if "mean_error" not in table:
+        raise DataError(f"{published}: expected a row mean_error")
+    manipulator, columns = CraneManipulator(geometry_of(machine)), columns_of(machine)
+    query, group = every(calibration.conditions.points, calibration.conditions.payloads)
+    conditions = Conditions(query, manipulator.initial_positions(query[:, :2]), group)
+    method = Uncompensated(manipulator)
+
+    def uncompensated(stiffness: float) -> pd.DataFrame:
+        judge = tip_judge(functools.partial(tips, flexible_crane(machine, stiffness)))
+        return pd.DataFrame(evaluate(method, conditions, judge, columns))
+
+    mean_error = 1e-3 * float(table["mean_error"])
+    fit = fit_spring(uncompensated, mean_error, calibration.stiffness_range)
+    print(f"ground spring {fit.spring_stiffness:.6g} N m/rad")
+    left = {"spring_stiffness": fit.spring_stiffness, "uncompensated": statistics(fit.errors)}
+    return {".json": json_file(left)}

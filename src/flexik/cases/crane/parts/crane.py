@@ -1,0 +1,37 @@
+"""The flexible crane that the pipeline has calibrated, for parts that put it into equilibrium."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexik.cases.crane.section import Section
+from flexik.kinematics.manipulator import Array
+from flexik.machines.crane import Machine
+from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
+from flexik.multibody.crane.model import tips
+from flexik.multibody.crane.structure import FlexibleCrane
+
+DATA = Path("data/crane")
+SPRING = DATA / "constants/spring.json"
+
+
+def model_inputs(section: Section) -> dict[str, Any]:
+    """Inputs `spring` and `sections` of a part that solves the flexible crane."""
+    return {"spring": SPRING, "sections": section.machine.structure.beams.sections}
+
+
+def flexible(machine: Machine, spring: Path) -> FlexibleCrane:
+    """The crane `machine` on the ground spring of the file `spring`."""
+    return flexible_crane(machine, read_spring_stiffness(spring))
+
+
+def sorted_tips(crane: FlexibleCrane, strokes: Array, payload: Array) -> Array:
+    """Tips (n, 2) in m at strokes (n, 3) under payload (n,), those of one extension together.
+
+    Raises the SolverError of the first row without equilibrium.
+    """
+    order = np.lexsort((payload, *strokes.T))
+    result = np.empty((len(strokes), 2))
+    result[order] = tips(crane, strokes[order], payload[order])
+    return result

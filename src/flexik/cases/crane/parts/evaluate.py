@@ -1,0 +1,141 @@
+"""Errors of every method under every set of conditions, a long table each.
+
+A part CONDITIONS/METHOD; `.spread.parquet` beside those of given points: the errors of the method
+with each of the networks that its training started, of which the best by selection is its own.
+"""
+
+import functools
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from flexik.cases.crane.parts.crane import flexible, model_inputs, sorted_tips
+from flexik.cases.crane.parts.fields import TARGET_FIELDS, columns_of
+from flexik.cases.crane.parts.methods import (
+    NETWORKS,
+    SAMPLES,
+    method_inputs,
+    method_settings,
+    trained_method,
+)
+from flexik.cases.crane.section import Section
+from flexik.datasets.parts import Part, Work, Writer, stacked, table
+from flexik.datasets.tables import Field, read_table
+from flexik.evaluation.conditions import Conditions, every
+from flexik.evaluation.errors import Judge, evaluate, fields_of, statistics, tip_judge
+from flexik.kinematics.crane_manipulator import CraneManipulator
+from flexik.learning.storage import load_networks
+from flexik.learning.training import TrainingRecord
+from flexik.machines.crane import Machine
+from flexik.parameters.conditions import Points
+from flexik.positioning.method import Columns, Method, Settings
+from flexik.positioning.registry import Build
+
+# Many rows at once pay for searches, of which a few take most steps
+ROWS = 2500
+SPREAD_FIELDS = (
+    Field("restart", "1", "start of the network's training, from 0", "int64"),
+    Field("selection_error", "1", "of that network: the least is the method's own"),
+    Field("mean_error", "m", "over all conditions"),
+    Field("max_error", "m", "over all conditions"),
+    Field("n_failed", "1", "conditions whose search failed", "int64"),
+)
+
+
+def parts(section: Section) -> list[Part]:
+    """Every method under all conditions."""
+    return [
+        _part(section, conditions, method)
+        for conditions in section.conditions
+        for method in section.methods
+    ]
+
+
+def _part(section: Section, conditions: str, name: str) -> Part:
+    given, method = section.conditions[conditions], section.methods[name]
+    settings = {"machine": section.machine, "name": name, **method_settings(section, name)}
+    inputs = {**model_inputs(section), **method_inputs(section, name)}
+    if isinstance(given, Points):
+        settings["points"] = given
+        # a genetic algorithm takes too long to be asked again with every network
+        if method.network is not None and getattr(method, "genetic", None) is None:
+            inputs["restarts"] = NETWORKS / f"{method.network}.restarts.json"
+    else:
+        settings["n_targets"] = method.n_targets
+        inputs["targets"] = SAMPLES / f"{conditions}.parquet"
+    return Part(f"{conditions}/{name}", prepare, settings, inputs)
+
+
+def prepare(
+    *,
+    machine: Machine,
+    name: str,
+    method: Settings,
+    build: Build,
+    spring: Path,
+    sections: dict[str, Path],
+    samples: Mapping[str, Path],
+    network: Path | None = None,
+    restarts: Path | None = None,
+    points: Points | None = None,
+    targets: Path | None = None,
+    n_targets: int | None = None,
+) -> Work:
+    """Ask the method in pieces, then with the network of every restart."""
+    crane = flexible(machine, spring)
+    manipulator = CraneManipulator(crane.geometry)
+    if points is not None:
+        query, group = every(points.points, points.payloads)
+    else:
+        assert targets is not None
+        frame = read_table(targets, TARGET_FIELDS)[:n_targets]
+        query = frame[[field.name for field in TARGET_FIELDS[:3]]].to_numpy()
+        group = np.arange(len(query))
+    conditions = Conditions(query, manipulator.initial_positions(query[:, :2]), group)
+    with_network = functools.partial(trained_method, method, build, manipulator, samples=samples)
+    asked = with_network(network)
+    items: list[Any] = [(asked, piece) for piece in conditions.chunks(ROWS)]
+    n_pieces, columns = len(items), columns_of(machine)
+    starts = [] if restarts is None else load_networks(restarts)
+    items += [(with_network(other), conditions) for other, _ in starts]
+
+    def finish(results: list[Mapping[str, NDArray]]) -> Mapping[str, Writer]:
+        fields = fields_of(results[0], columns)
+        found = stacked(results[:n_pieces], fields)
+        of_method = statistics(pd.DataFrame(found))
+        print(
+            f"{name}: mean error {1e3 * of_method['mean_error']:.2f} mm, "
+            f"max {1e3 * of_method['max_error']:.2f} mm, "
+            f"{of_method['n_failed']} of {of_method['n_conditions']} failed"
+        )
+        writers = {".parquet": table(found, fields)}
+        if starts:
+            records = [record for _, record in starts]
+            writers[".spread.parquet"] = table(_spread(records, results[n_pieces:]), SPREAD_FIELDS)
+        return writers
+
+    judge = tip_judge(functools.partial(sorted_tips, crane))
+    return Work(functools.partial(_errors, judge, columns), items, finish)
+
+
+def _errors(
+    judge: Judge, columns: Columns, item: tuple[Method, Conditions]
+) -> Mapping[str, NDArray]:
+    method, conditions = item
+    return evaluate(method, conditions, judge, columns)
+
+
+def _spread(
+    records: Sequence[TrainingRecord], results: Sequence[Mapping[str, NDArray]]
+) -> dict[str, NDArray]:
+    """Columns SPREAD_FIELDS."""
+    found = pd.DataFrame([statistics(pd.DataFrame(result)) for result in results])
+    return {
+        "restart": np.array([record.restart for record in records]),
+        "selection_error": np.array([record.selection_error for record in records], dtype=float),
+        **{name: found[name].to_numpy() for name in ("mean_error", "max_error", "n_failed")},
+    }

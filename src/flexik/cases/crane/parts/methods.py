@@ -1,0 +1,59 @@
+"""Methods with the networks that the pipeline trained, as parts name and read them."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from flexik.cases.crane.parts.crane import DATA
+from flexik.cases.crane.section import Section
+from flexik.datasets.tables import read_table
+from flexik.errors import ParameterError
+from flexik.kinematics.crane_manipulator import CraneManipulator, geometry_of
+from flexik.kinematics.manipulator import Manipulator
+from flexik.learning.storage import load_network
+from flexik.positioning.method import Ingredients, Method, Network, Settings
+from flexik.positioning.registry import Build, build_of
+
+NETWORKS, SAMPLES = DATA / "networks", DATA / "samples"
+
+
+def method_settings(section: Section, name: str) -> dict[str, Any]:
+    """Settings `method` and `build` of a part that asks method `name` of params.yaml.
+
+    Raises ParameterError if there is no such method.
+    """
+    if name not in section.methods:
+        known = ", ".join(section.methods)
+        raise ParameterError(f"crane.methods: there is no {name!r} ({known})")
+    method = section.methods[name].model_copy(update={"n_targets": None})
+    return {"method": method, "build": build_of(method)}
+
+
+def method_inputs(section: Section, name: str) -> dict[str, Any]:
+    """Inputs `network` and `samples`, those that method `name` is built from."""
+    method = section.methods[name]
+    inputs: dict[str, Any] = {"samples": {n: SAMPLES / f"{n}.parquet" for n in method.reads}}
+    if method.network is not None:
+        inputs["network"] = NETWORKS / f"{method.network}.json"
+    return inputs
+
+
+def trained_method(
+    method: Settings,
+    build: Build,
+    manipulator: Manipulator,
+    network: Path | Network | None = None,
+    samples: Mapping[str, Path] | None = None,
+) -> Method:
+    """The method of `method_settings` with its trained `network` and its tables of samples."""
+    if isinstance(network, Path):
+        network = load_network(network)[0]
+    tables = {name: read_table(path) for name, path in (samples or {}).items()}
+    return build(method, Ingredients(manipulator, network, tables))
+
+
+def method_of(section: Section, name: str) -> Method:
+    """Method `name` of params.yaml, read from the data of the pipeline."""
+    manipulator = CraneManipulator(geometry_of(section.machine))
+    inputs = method_inputs(section, name)
+    return trained_method(**method_settings(section, name), manipulator=manipulator, **inputs)

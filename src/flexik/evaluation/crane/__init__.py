@@ -1,1 +1,0 @@
-"""What is judged on the crane alone: calibration and the measured campaign."""
