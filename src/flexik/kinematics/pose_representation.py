@@ -7,8 +7,8 @@ singular. What is learnt instead is continuous over all of one arm configuration
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.kinematics.fanuc import SHOULDER, WRIST, configuration, wrapped
 from flexik.kinematics.serial_arm import Array, Pose, SerialArm, frames
+from flexik.kinematics.spherical_wrist import SHOULDER, WRIST, configuration, wrapped
 
 # Name and unit of each column
 INPUTS = (
@@ -29,6 +29,16 @@ def pose_inputs(pose: Pose) -> Array:
     2019).
     """
     return np.hstack([pose.position, pose.rotation.reshape(-1, 9)])
+
+
+def queries(pose: Pose, number: NDArray[np.int64]) -> Array:
+    """Rows (n, 13) that methods are asked: columns INPUTS, and the arm configuration `number`."""
+    return np.column_stack([pose_inputs(pose), number.astype(np.float64)])
+
+
+def asked(query: Array) -> tuple[Pose, NDArray[np.int64]]:
+    """Poses, and numbers (n,) of arm configurations, of rows of `queries`."""
+    return Pose(query[:, :3], query[:, 3:12].reshape(-1, 3, 3)), query[:, 12].astype(np.int64)
 
 
 def joint_outputs(arm: SerialArm, joints: Array) -> Array:

@@ -1,0 +1,1 @@
+"""Six-joint arm after the FANUC M-710i (Hasan 2005)."""

@@ -1,0 +1,167 @@
+"""Command the joints that every method gives, and see where the end effector comes to stand."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexik.cases.fanuc.parts.samples import arm_of
+from flexik.cases.fanuc.parts.tables import (
+    COMMANDED_FIELDS,
+    ERROR_FIELDS,
+    JOINT_FIELDS,
+    PATH_FIELDS,
+    POSITION_FIELDS,
+    QUERY_FIELDS,
+    START_ERRORS,
+    STEPS,
+    array,
+)
+from flexik.cases.fanuc.section import CONDITIONS, EXACT, LOOKED_UP, WHOLE, Refinement, Section
+from flexik.datasets.parts import Columns as Table
+from flexik.datasets.parts import Part, Work, Writer, stacked, table
+from flexik.datasets.tables import read_table
+from flexik.evaluation.conditions import Conditions
+from flexik.evaluation.errors import GROUP, STATUS, evaluate
+from flexik.kinematics.pose_representation import asked
+from flexik.kinematics.serial_arm import Array, SerialArm, forward, pose_errors
+from flexik.kinematics.spherical_wrist import configuration
+from flexik.learning.storage import load_networks
+from flexik.positioning.arm_configurations import ArmConfigurations
+from flexik.positioning.closed_form import ClosedForm
+from flexik.positioning.interpolated import Interpolated
+from flexik.positioning.method import Columns, Method
+from flexik.positioning.nearest_sample import NearestSample
+from flexik.positioning.predicted import Predicted
+from flexik.positioning.refined import Refined
+
+DATA = Path("data/fanuc")
+FIELDS = (STEPS, GROUP, *QUERY_FIELDS, *COMMANDED_FIELDS, *ERROR_FIELDS, STATUS)
+
+
+def parts(section: Section) -> list[Part]:
+    """A table of errors of every method under every set of conditions it is asked.
+
+    Networks of the path know no orientation, and are not asked for random poses.
+    """
+    found = []
+    for name, method in section.methods.items():
+        for where in CONDITIONS:
+            if where == "random_poses" and name in section.path_methods:
+                continue
+            steps = section.conditions.refinement
+            settings = {
+                "arm": arm_of(section.machine.joints),
+                "kind": method.kind,
+                "refinement": None if where == "path" or name == EXACT else steps,
+            }
+            asked_for = DATA / f"samples/conditions/{where}.parquet"
+            inputs = {"asked_for": asked_for, **inputs_of(section, name)}
+            found.append(Part(f"{where}/{name}", prepare, settings, inputs))
+    return found
+
+
+def inputs_of(section: Section, name: str) -> dict[str, Path]:
+    """Files that the method `name` is made of."""
+    if name == WHOLE:
+        return {"networks": DATA / f"networks/{name}.json"}
+    if name in section.networks:
+        files = {"networks": f"{name}.json", "restarts": f"{name}.restarts.json"}
+        return {key: DATA / "networks" / file for key, file in files.items()}
+    return {"path": DATA / "samples/path.parquet"} if name in LOOKED_UP else {}
+
+
+def method(section: Section, name: str) -> Method:
+    """The method `name`, from the files of the stages before."""
+    files = inputs_of(section, name)
+    files.pop("restarts", None)
+    return _methods(arm_of(section.machine.joints), section.methods[name].kind, **files)[0]
+
+
+def _methods(
+    arm: SerialArm, kind: str, networks: Path | None = None, path: Path | None = None
+) -> list[Method]:
+    """The method of `kind`; of a file of several networks of the path, a method of each."""
+    if networks is not None:
+        known = [network for network, _ in load_networks(networks)]
+        if kind == "arm_configurations":
+            return [ArmConfigurations(arm, dict(enumerate(known)))]
+        return [Predicted(network, arm.minimum, arm.maximum) for network in known]
+    if path is not None:
+        samples = read_table(path, PATH_FIELDS)
+        training = samples[samples["is_test"] == 0]
+        taught = array(training, POSITION_FIELDS), array(training, JOINT_FIELDS)
+        return [{"nearest_sample": NearestSample, "interpolated": Interpolated}[kind](*taught)]
+    return [ClosedForm(arm)]
+
+
+@dataclass(frozen=True, eq=False)
+class Item:
+    """A method, the queries (n, 13) it is asked, and Newton steps after it."""
+
+    arm: SerialArm
+    method: Method
+    query: Array
+    refinement: Refinement | None
+
+
+def prepare(
+    *,
+    arm: SerialArm,
+    kind: str,
+    refinement: Refinement | None,
+    asked_for: Path,
+    networks: Path | None = None,
+    restarts: Path | None = None,
+    path: Path | None = None,
+) -> Work:
+    """Errors of the method; of all starts of its network, if there are several, the statistics."""
+    query = array(read_table(asked_for), QUERY_FIELDS)
+    chosen = _methods(arm, kind, networks, path)
+    starts = [] if restarts is None else _methods(arm, kind, restarts)
+    items = [Item(arm, each, query, refinement) for each in chosen]
+    items += [Item(arm, each, query, None) for each in starts]
+
+    def finish(results: list[Table]) -> Mapping[str, Writer]:
+        writers = {".parquet": table(results[0], FIELDS)}
+        if starts:
+            found = [_statistics(k, each) for k, each in enumerate(results[1:])]
+            writers[".starts.parquet"] = table(stacked(found, START_ERRORS), START_ERRORS)
+        return writers
+
+    return Work(errors_of, items, finish)
+
+
+def errors_of(item: Item) -> Table:
+    """Columns FIELDS."""
+    arm, steps, tables = item.arm, item.refinement, []
+    conditions = Conditions(item.query, np.zeros((len(item.query), 6)), np.arange(len(item.query)))
+    columns = Columns(QUERY_FIELDS, COMMANDED_FIELDS, ERROR_FIELDS, arm.minimum, arm.maximum)
+    for n_steps in range((0 if steps is None else steps.n_steps) + 1):
+        method = item.method
+        if n_steps and steps is not None:
+            method = Refined(arm, method, n_steps, steps.damping, steps.orientation_length)
+        found = evaluate(method, conditions, lambda q, v: judge(arm, q, v), columns)
+        tables.append(found | {STEPS.name: np.full(len(item.query), n_steps)})
+    return stacked(tables, FIELDS)
+
+
+def judge(arm: SerialArm, query: Array, values: Array) -> dict[str, NDArray]:
+    """Columns ERROR_FIELDS: where the end effector comes to stand, and in which configuration."""
+    target, number = asked(query)
+    distance, angle = pose_errors(target, forward(arm, values))
+    there = configuration(arm, values) == number
+    found = distance, angle, there.astype(np.int64)
+    return {field.name: column for field, column in zip(ERROR_FIELDS, found, strict=True)}
+
+
+def _statistics(start: int, errors: Table) -> Table:
+    values = (
+        start,
+        errors["error"].mean(),
+        errors["error"].max(),
+        errors["orientation_error"].mean(),
+    )
+    return {field.name: np.array([v]) for field, v in zip(START_ERRORS, values, strict=True)}

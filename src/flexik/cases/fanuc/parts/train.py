@@ -1,0 +1,240 @@
+"""Train the networks of the taught path, and those of the whole workspace."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from flexik.cases.fanuc.parts.learning import Run, TaughtSamples, learn, percent, side_by_side
+from flexik.cases.fanuc.parts.samples import arm_of
+from flexik.cases.fanuc.parts.tables import (
+    CONFIGURATION,
+    CURVE_FIELDS,
+    JOINT_FIELDS,
+    PATH_FIELDS,
+    POSE_FIELDS,
+    START_FIELDS,
+    array,
+)
+from flexik.cases.fanuc.section import N_JOINTS, Section
+from flexik.datasets.parts import Columns, Part, Work, Writer, stacked, table
+from flexik.datasets.tables import read_table
+from flexik.kinematics.pose_representation import INPUTS, OUTPUTS, joint_outputs, pose_inputs
+from flexik.kinematics.serial_arm import Array, SerialArm, forward
+from flexik.kinematics.spherical_wrist import N_CONFIGURATIONS, canonical
+from flexik.learning.perceptron import Network, Quantity
+from flexik.learning.stopping import StopReason
+from flexik.learning.storage import network_file, packed, unpacked
+from flexik.learning.training import Architecture, Lesson, TrainingRecord, train
+from flexik.parameters.trainers import BackPropagation, Stopping
+
+SAMPLES = Path("data/fanuc/samples")
+ALL_JOINTS = tuple(range(1, 7))
+
+
+def parts(section: Section) -> list[Part]:
+    """A part for every network, or networks of one name."""
+    found = []
+    for name, network in section.networks.items():
+        settings = {
+            "learns": network.learns,
+            "n_hidden": network.sizes[0],
+            "activation": network.activation,
+            "seed": network.seed,
+            "trainer": section.trainers[network.trainer],
+        }
+        if network.learns == "arm_configuration":
+            settings["arm"] = arm_of(section.machine.joints)
+            settings.pop("learns")
+            found.append(Part(name, prepare_poses, settings, {"poses": SAMPLES / "poses.parquet"}))
+        else:
+            settings["n_restarts"] = network.n_restarts
+            found.append(Part(name, prepare_path, settings, {"path": SAMPLES / "path.parquet"}))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Item:
+    """Networks of some starts; `n_groups` of one start give all joints."""
+
+    samples: TaughtSamples
+    n_groups: int
+    runs: list[Run]
+
+
+def prepare_path(
+    *,
+    learns: str,
+    n_hidden: tuple[int, ...],
+    activation: str,
+    seed: int,
+    trainer: Stopping,
+    n_restarts: int,
+    path: Path,
+) -> Work:
+    """Networks from position to joints, one for all or one each, which are joined into one.
+
+    Files: the network of the median start, those of all starts, errors of the starts, and errors
+    pass by pass. Starts learn together where the trainer can.
+    """
+    samples = TaughtSamples.of_table(read_table(path, PATH_FIELDS))
+    groups = [ALL_JOINTS] if learns == "all_joints" else [(joint,) for joint in ALL_JOINTS]
+    runs = [
+        Run(joints, Architecture(n_hidden, activation), trainer, seed, start * len(groups) + k)
+        for start in range(n_restarts)
+        for k, joints in enumerate(groups)
+    ]
+    n = len(runs) if isinstance(trainer, BackPropagation) else len(groups)
+    items = [Item(samples, len(groups), runs[k : k + n]) for k in range(0, len(runs), n)]
+    return Work(train_starts, items, lambda results: _files(samples, results))
+
+
+def train_starts(item: Item) -> Columns:
+    """Of every start k: network_k, packed; kept_k (6,); curves_k (2, passes + 1, 6).
+
+    Where a network took fewer passes than another of its start, its curve ends with nan.
+    """
+    learnt, n, found = learn(item.samples, item.runs), item.n_groups, dict[str, np.ndarray]()
+    for first in range(0, len(learnt), n):
+        of_start, start = learnt[first : first + n], item.runs[first].restart // n
+        n_passes = max(each.curves.shape[1] for each in of_start)
+        curves = [
+            np.pad(
+                e.curves,
+                ((0, 0), (0, n_passes - e.curves.shape[1]), (0, 0)),
+                constant_values=np.nan,
+            )
+            for e in of_start
+        ]
+        joined = side_by_side([each.network for each in of_start])
+        record = joined_record([each.record for each in of_start], start)
+        kept = [each.record.kept for each in of_start for _ in each.network.outputs]
+        found |= {
+            f"network_{start}": packed(joined, record)["json"],
+            f"kept_{start}": np.array(kept),
+            f"curves_{start}": np.concatenate(curves, axis=2),
+        }
+    return found
+
+
+def joined_record(records: Sequence[TrainingRecord], start: int) -> TrainingRecord:
+    """Record of networks that were joined.
+
+    Errors are means over those that still learn, the pass kept is the last one that one of them
+    keeps, the reason to stop that of the first that did not use all passes.
+    """
+    n = max(len(record.errors) for record in records)
+    errors = [np.pad(r.errors, (0, n - len(r.errors)), constant_values=np.nan) for r in records]
+    reasons = [r.stop_reason for r in records if r.stop_reason != StopReason.ITERATIONS]
+    return replace(
+        records[0],
+        restart=start,
+        stop_reason=(reasons or [StopReason.ITERATIONS])[0],
+        errors=tuple(np.nanmean(errors, axis=0).tolist()),
+        kept=max(record.kept for record in records),
+    )
+
+
+def _files(samples: TaughtSamples, results: list[Columns]) -> Mapping[str, Writer]:
+    found = {name: values for result in results for name, values in result.items()}
+    starts, curves, pairs = [], [], []
+    for start in range(len(found) // 3):
+        network, record = trained({"json": found[f"network_{start}"]})
+        pairs.append((network, record))
+        columns = network.predict(samples.test_positions), samples.test_joints, samples.ranges
+        starts.append(
+            {
+                "restart": np.full(N_JOINTS, start),
+                "joint": np.array(ALL_JOINTS),
+                "error_percent": percent(*columns),
+                "kept": found[f"kept_{start}"],
+            }
+        )
+        errors = found[f"curves_{start}"]
+        joint, iteration = np.nonzero(np.isfinite(errors[0].T))
+        curves.append(
+            {
+                "restart": np.full(len(joint), start),
+                "joint": joint + 1,
+                "iteration": iteration,
+                "training_error": errors[0, iteration, joint],
+                "test_error": errors[1, iteration, joint],
+            }
+        )
+    means = [each["error_percent"].mean() for each in starts]
+    # of two in the middle the better
+    median = int(np.argsort(means, kind="stable")[(len(means) - 1) // 2])
+    for start, each in enumerate(starts):
+        each["is_median"] = np.full(N_JOINTS, int(start == median))
+    return {
+        ".json": network_file([pairs[median]]),
+        ".restarts.json": network_file(pairs),
+        ".starts.parquet": table(stacked(starts, START_FIELDS), START_FIELDS),
+        ".curves.parquet": table(stacked(curves, CURVE_FIELDS), CURVE_FIELDS),
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class WorkspaceItem:
+    """The network of arm configuration `number`, from joints (n, 6) in rad of it."""
+
+    arm: SerialArm
+    number: int
+    joints: Array
+    architecture: Architecture
+    settings: Stopping
+    seed: int
+
+
+def prepare_poses(
+    *,
+    arm: SerialArm,
+    n_hidden: tuple[int, ...],
+    activation: str,
+    seed: int,
+    trainer: Stopping,
+    poses: Path,
+) -> Work:
+    """One network an arm configuration, in the order of their numbers."""
+    found, architecture = read_table(poses, POSE_FIELDS), Architecture(n_hidden, activation)
+    items = [
+        WorkspaceItem(
+            arm,
+            number,
+            array(found[found[CONFIGURATION.name] == number], JOINT_FIELDS),
+            architecture,
+            trainer,
+            seed,
+        )
+        for number in range(N_CONFIGURATIONS)
+    ]
+
+    def finish(results: list[Columns]) -> Mapping[str, Writer]:
+        pairs = [trained(result) for result in results]
+        for number, (_, record) in enumerate(pairs):
+            print(f"configuration {number}: mean squared error {record.errors[record.kept]:.3g}")
+        return {".json": network_file(pairs)}
+
+    return Work(train_workspace, items, finish)
+
+
+def train_workspace(item: WorkspaceItem) -> Columns:
+    """The network from poses to what stands for the joints, packed."""
+    lesson = Lesson(
+        pose_inputs(forward(item.arm, item.joints)),
+        joint_outputs(item.arm, canonical(item.arm, item.joints)),
+        [Quantity(*column) for column in INPUTS],
+        [Quantity(*column) for column in OUTPUTS],
+        item.architecture,
+        item.settings,
+        item.seed,
+    )
+    return packed(*train(lesson, item.number))
+
+
+def trained(arrays: Columns) -> tuple[Network, TrainingRecord]:
+    """A network that was `packed`, and its record."""
+    network, record = unpacked(arrays)
+    assert network is not None
+    return network, record

@@ -1,1 +1,0 @@
-"""Errors of the six-joint arm."""
