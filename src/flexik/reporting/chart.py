@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
@@ -159,11 +160,11 @@ def chart(
     of_panel = [_axis(x, name) for name in names], [_axis(y, name) for name in names]
     # one label for all panels in a row or column
     one = columns > 1 and isinstance(x, Axis), rows > 1 and isinstance(y, Axis)
-    least = [_least(layers, axes, "x" if k == 0 else "y") for k, axes in enumerate(of_panel)]
     for k, (axes, name) in enumerate(zip(grid, names, strict=False)):
-        scales = of_panel[0][k], of_panel[1][k]
-        for layer in layers:
-            rows_of = _rows(layer, panel, name)
+        scales, inside = (of_panel[0][k], of_panel[1][k]), [_rows(la, panel, name) for la in layers]
+        drawn = [list(zip(layers, inside, strict=True)), [(la, la.frame) for la in layers]]
+        least = [_least(drawn[isinstance(x, Axis)], "x"), _least(drawn[isinstance(y, Axis)], "y")]
+        for layer, rows_of in zip(layers, inside, strict=True):
             if len(rows_of):
                 _draw(axes, layer, rows_of, scales, least, looks)
         for rule in rules:
@@ -171,7 +172,8 @@ def chart(
                 line = axes.axvline if rule.axis == "x" else axes.axhline
                 line(rule.value, label=rule.label or None, zorder=1.6, **rule.look)
         title = titles.get(name, "" if name is None else str(name))
-        axes.set_title(textwrap.fill(title, TITLE_CHARACTERS // columns))
+        wrapped = (textwrap.fill(line, TITLE_CHARACTERS // columns) for line in title.splitlines())
+        axes.set_title("\n".join(wrapped))
         if equal:
             axes.set_aspect("equal", adjustable="box")
     for k, axes in enumerate(grid):
@@ -220,12 +222,14 @@ def _rows(layer: Layer, panel: str | None, name: Any) -> pd.DataFrame:
     return layer.frame[layer.frame[panel] == name]
 
 
-def _least(layers: Iterable[Layer], axes: Sequence[Axis], which: Literal["x", "y"]) -> float:
-    """Least value drawn on logarithmic axes without one of their own, in their unit."""
-    columns = {"x": lambda la: (la.x,), "y": lambda la: (la.y, la.to) if la.to else (la.y,)}[which]
-    scale = max(axis.scale for axis in axes)
-    drawn = [scale * la.frame[list(columns(la))].to_numpy(dtype=float).ravel() for la in layers]
-    values = np.concatenate(drawn)
+def _least(drawn: Iterable[tuple[Layer, pd.DataFrame]], which: Literal["x", "y"]) -> float:
+    """Least value drawn on a logarithmic axis without one of its own, in the unit of the column."""
+    found = [
+        rows[name].to_numpy(dtype=float)
+        for layer, rows in drawn
+        for name in ((layer.x,) if which == "x" else filter(None, (layer.y, layer.to)))
+    ]
+    values = np.concatenate(found)
     positive = values[np.isfinite(values) & (values > 0)]
     if not positive.size:
         return 1.0
@@ -235,7 +239,7 @@ def _least(layers: Iterable[Layer], axes: Sequence[Axis], which: Literal["x", "y
 def _place(values: pd.Series, axis: Axis, least: float) -> Array:
     numbers = axis.scale * values.to_numpy(dtype=float)
     if axis.least is not None or (axis.log and axis.linear_below is None):
-        numbers = np.maximum(numbers, least if axis.least is None else axis.least)
+        numbers = np.maximum(numbers, axis.scale * least if axis.least is None else axis.least)
     return numbers
 
 
@@ -386,10 +390,13 @@ def _legend(figure: Figure, panels: Iterable[Axes], heading: str) -> None:
         return
     longest = max(len(label) for label in entries) + 6
     columns = max(1, min(len(entries), LEGEND_CHARACTERS // longest))
-    figure.legend(
+    legend = figure.legend(
         list(entries.values()),
         list(entries),
         loc="outside upper center",
         ncols=columns,
         title=heading or None,
     )
+    for handle in legend.legend_handles:
+        if isinstance(handle, Line2D):  # the dots of many points are small
+            handle.set_markersize(max(handle.get_markersize(), 5.0))

@@ -20,7 +20,7 @@ from flexik.reporting import style
 from flexik.reporting.tables import Table
 
 # lines that end a paragraph: lists, tables, headings, figures, markers
-_OWN_LINE = re.compile(r"\s*([-*|#<]|!\[|\d+\. )")
+_OWN_LINE = re.compile(r"\s*([-*|] |#+ |<|!\[|\d+\. )")
 
 
 def _unit(scale: float, unit: str) -> Callable[..., str]:
@@ -138,5 +138,5 @@ def unwrapped(text: str) -> str:
             lines[-1] += f" {line.strip()}"
             continue
         lines.append(line.rstrip())
-        joins = bool(line.strip()) and not re.match(r"\s*([|#<]|!\[)", line)
+        joins = bool(line.strip()) and not re.match(r"\s*(\| |#+ |<|!\[)", line)
     return "\n".join(lines)

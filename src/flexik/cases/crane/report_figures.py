@@ -1,0 +1,402 @@
+"""Figures of the crane's report, after those of Rouvinen 1999; lengths in m until drawn."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from flexik.cases.crane.report_mechanism import LINK_LOOKS, crane, links
+from flexik.cases.crane.report_results import Results
+from flexik.evaluation.errors import comparison
+from flexik.kinematics.status import REACHED
+from flexik.reporting import kinds, plane, style
+from flexik.reporting.chart import Axis, Layer, chart
+from flexik.reporting.report import Drawing, draw
+from flexik.reporting.style import MM
+
+X, Y = Axis("x (m)"), Axis("y (m)")
+STROKES = ("lift_stroke", "jib_stroke", "extension_stroke")
+ERROR_ROWS = {"error_x": "dX (mm)", "error_y": "dY (mm)", "error": "R (mm)"}
+CELL = 0.25  # m, side of a square of the error map
+# Variants of a method have its hue
+VARIANTS = ("_selected", "_ga", "_gauss_newton")
+
+
+def figures(results: Results) -> dict[str, Drawing]:
+    """All figures by name."""
+    return {
+        "crane": crane(results.geometry, results.shape),
+        **_training_data(results),
+        **_errors(results),
+        **_sizes(results),
+        "training_race": _race(results.training_curves),
+        "under_and_overfitting": _fitting(results),
+    }
+
+
+def _looks(results: Results) -> dict:
+    return style.looks(("none", *results.methods), VARIANTS)
+
+
+def _training_data(results: Results) -> dict[str, Drawing]:
+    kept, kinds_of = results.kept, {"rigid": "rigid tip", "tip": "flexible tip"}
+    bent = kept[["tip_x", "tip_y"]].to_numpy() - kept[["rigid_x", "rigid_y"]].to_numpy()
+    found = {
+        "training_points": _training_points(results),
+        "test_points": _test_points(results),
+        "initial_positions": _initial_positions(results),
+        "sequences": _sequences(kept),
+        "normalised_deflection": _pair(bent, "deflection", "mm", MM),
+    }
+    for name, what in kinds_of.items():
+        values = kept[[f"{name}_x", f"{name}_y"]].to_numpy()
+        found[f"normalised_{name}"] = _pair(values, what, "m", 1.0)
+    for name, values in results.corrections.items():
+        what = "flexible tip minus trained rigid network"
+        found[f"normalised_difference_{name}"] = _pair(values, what, "mm", MM)
+    return found
+
+
+def _training_points(results: Results) -> Drawing:
+    """All training points, and enlarged those about the largest deflection."""
+    kept = results.kept.sort_values("payload", ascending=False, kind="stable")
+    far = np.hypot(kept["tip_x"] - kept["rigid_x"], kept["tip_y"] - kept["rigid_y"]).idxmax()
+    x, y = kept.loc[far, "tip_x"], kept.loc[far, "tip_y"]
+    low, high = np.array([x - 0.6, y - 0.35]), np.array([x + 0.1, y + 0.55])
+    corners = np.array([low, [high[0], low[1]], high, [low[0], high[1]], low])
+    frame = pd.DataFrame(corners, columns=["x", "y"]).assign(panel="all")
+    rigid = kept.drop_duplicates(["rigid_x", "rigid_y"])
+    plus = {"color": style.INK, "markersize": 5, "markeredgewidth": 0.7, "zorder": 2.6}
+    parts = links(results.geometry, np.array(results.geometry.stroke_maximum)[None] / 2)
+    ink = {"color": style.INK, "linewidth": 0.9}
+    return draw(
+        chart,
+        Layer(parts.assign(panel="all"), "x", "y", "-", "link", "piece", label=""),
+        Layer(rigid, "rigid_x", "rigid_y", "+", label="rigid", look=plus),
+        Layer(
+            *(kept.assign(panel="all"), "tip_x", "tip_y", "."),
+            hue="payload",
+            label="{:g} kg",
+            look={"markersize": 3, "markeredgewidth": 0},
+        ),
+        Layer(
+            *(kept.assign(panel="enlarged"), "tip_x", "tip_y", "o"),
+            hue="payload",
+            label="",
+            look={"markersize": 5, "markeredgewidth": 0},
+        ),
+        Layer(frame, "x", "y", "-", label="", look=ink),
+        x={"all": X, "enlarged": Axis("x (m)", limits=(low[0], high[0]))},
+        y={"all": Y, "enlarged": Axis("y (m)", limits=(low[1], high[1]))},
+        panel="panel",
+        panels=("all", "enlarged"),
+        titles={
+            "all": f"Tips of {len(kept)} training vectors",
+            "enlarged": "the frame enlarged",
+        },
+        columns=2,
+        widths=(1.6, 1),
+        share="",
+        equal=True,
+        height=8.6,
+        looks=style.shades(kept["payload"]) | LINK_LOOKS,
+    )
+
+
+def _test_points(results: Results) -> Drawing:
+    points = pd.DataFrame(results.points, columns=["x", "y"])
+    named = points.assign(text=[style.coordinates(*p) for p in results.points], dy=10.0)
+    white = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
+    grey = {"color": "#B8B8B8", "markersize": 2.5}
+    dot = {"color": style.VERMILION, "markeredgecolor": "white", "markersize": 9}
+    return draw(
+        chart,
+        Layer(results.kept, "tip_x", "tip_y", ".", label="training tips", look=grey),
+        Layer(points, "x", "y", "o", label=f"{len(points)} test points", look=dot),
+        Layer(named, "x", "y", "text", text="text", look={"bbox": white, "path_effects": []}),
+        x=X,
+        y=Y,
+        equal=True,
+        width=6.2,
+        height=9.2,
+    )
+
+
+def _initial_positions(results: Results) -> Drawing:
+    names = [style.coordinates(*point) for point in results.points]
+    parts = links(results.geometry, results.initial)
+    parts["point"] = [names[k] for k in parts["crane"]]
+    points = pd.DataFrame(results.points, columns=["x", "y"]).assign(point=names)
+    dot = {"color": style.INK, "fillstyle": "none", "markersize": 5}
+    rows = -(-len(names) // 7)
+    return draw(
+        chart,
+        Layer(parts, "x", "y", "-", hue="link", group="piece"),
+        Layer(points, "x", "y", "o", label="test point", look=dot),
+        x=X,
+        y=Y,
+        panel="point",
+        columns=7,
+        equal=True,
+        height=0.9 + 1.95 * rows,
+        looks=LINK_LOOKS,
+    )
+
+
+def _sequences(kept: pd.DataFrame) -> Drawing:
+    units = dict.fromkeys(STROKES, ("mm", MM)) | {"payload": ("kg", 1.0)}
+    parts = {}
+    for name, (unit, scale) in units.items():
+        low, high = (style.signed(scale * v) for v in (kept[name].min(), kept[name].max()))
+        parts[f"{name.replace('_', ' ')}: {low} to {high} {unit}"] = kept[name].to_numpy()
+    colours = [LINK_LOOKS[name]["color"] for name in ("lift arm", "jib", "extension")]
+    return draw(kinds.sequences, parts, [*colours, style.PURPLE])
+
+
+def _pair(values: np.ndarray, what: str, unit: str, scale: float) -> Drawing:
+    """Sequences of the two columns of `values` (n, 2) in m."""
+    digits, parts = 1 if unit == "mm" else 2, {}
+    for axis, column in zip("xy", values.T, strict=True):
+        ends = scale * column.min(), scale * column.max()
+        low, high = (style.signed(round(float(end), digits)) for end in ends)
+        parts[f"{what} in {axis}: {low} to {high} {unit}"] = column
+    return draw(kinds.sequences, parts, (style.BLUE, style.VERMILION))
+
+
+def _errors(results: Results) -> dict[str, Drawing]:
+    looks, variants = _looks(results), results.groups["variants"]
+    shown = {k: f for k, f in results.workspace.items() if len(f) and k not in variants}
+    over_workspace = pd.concat(shown, names=["method"]).reset_index(level="method")
+    found = {
+        "method_comparison": _comparison(results),
+        "error_map": draw(
+            plane.maps,
+            *(over_workspace, "target_x", "target_y", "error", "method"),
+            label="error (mm)",
+            scale=MM,
+            cell=CELL,
+        ),
+        "error_distribution": draw(
+            kinds.distribution,
+            *(over_workspace, "error", "method", Axis("error (mm)", MM, log=True)),
+            looks=looks,
+        ),
+        "tolerance_study": _tolerances(results.tolerances, results.published.tolerances, looks),
+    }
+    for label in results.methods:
+        found[f"positioning_errors_{label}"] = _positioning_errors(
+            results.errors["none"], results.errors[label], label
+        )
+    cost = results.query_cost().drop(columns="published").dropna()
+    return found | ({"query_cost": _cost(cost, looks)} if len(cost) else {})
+
+
+def _comparison(results: Results) -> Drawing:
+    compared = comparison(results.statistics, results.published.errors, results.published_columns)
+    rows = [
+        {
+            "method": label,
+            "what": what,
+            "ours": compared.loc[f"{what}_error", label],
+            "published": compared.loc[f"{what}_error", f"{label} published"],
+        }
+        for what in ("mean", "max")
+        for label in results.statistics
+    ]
+    axes = {what: Axis(f"{what} R (mm)", log=True) for what in ("mean", "max")}
+    return draw(
+        kinds.beside,
+        *(pd.DataFrame(rows), "method", "ours", "published", axes),
+        panel="what",
+        titles=dict.fromkeys(axes, ""),
+        columns=2,
+    )
+
+
+def _positioning_errors(none: pd.DataFrame, frame: pd.DataFrame, label: str) -> Drawing:
+    """Errors without and with compensation at every condition (figure 4.8)."""
+    keys = ["point", "payload", "status"]
+    before, after = (f.melt(keys, list(ERROR_ROWS), "row", "value") for f in (none, frame))
+    reached = after["status"] == REACHED
+    names = frame.drop_duplicates("point").set_index("point")[["target_x", "target_y"]]
+    grey = {"color": style.GREY, "fillstyle": "none", "markersize": 3.2}
+    layers = [Layer(before, "point", "value", "o", label="uncompensated", look=grey)]
+    for rows, mark, text in (
+        (after[reached], "o", f"{label}: {{:g}} kg"),
+        (after[~reached], "x", ""),
+    ):
+        if len(rows):
+            layers.append(Layer(rows, "point", "value", mark, hue="payload", label=text))
+    if not reached.all():
+        ink = {"color": style.INK}
+        failed = after[~reached][:1].assign(value=np.nan)
+        layers.append(Layer(pd.concat([failed, after[:1]]), "point", "value", "x", look=ink))
+    return draw(
+        kinds.strips,
+        *layers,
+        category="point",
+        names={point: style.coordinates(x, y) for point, x, y in names.itertuples()},
+        spread="payload",
+        y={row: Axis(text, MM, linear_below=1.0) for row, text in ERROR_ROWS.items()},
+        x_label="test point, x and y in m (errors: linear scale below 1 mm, logarithmic above)",
+        panel="row",
+        titles=dict.fromkeys(ERROR_ROWS, ""),
+        columns=1,
+        share="x",
+        height=8.2,
+        looks=style.shades(frame["payload"]),
+    )
+
+
+def _tolerances(ours: pd.DataFrame, theirs: pd.DataFrame, looks: Mapping) -> Drawing:
+    """Mean error and iterations against the tolerance of the search (chapter 4)."""
+    ours = ours.sort_values("tolerance").assign(error="error", iterations="iterations")
+    theirs = theirs.reset_index(drop=True).assign(iterations="iterations")
+    errors = ours.rename(columns={"error": "panel"})
+    counts, published = (f.rename(columns={"iterations": "panel"}) for f in (ours, theirs))
+    thin = {"linewidth": 0.7, "markersize": 2.5}
+    open_dot, small = {"fillstyle": "none", "markersize": 7}, {"fillstyle": "none"}
+    return draw(
+        chart,
+        Layer(errors, "tolerance", "mean_error", "o-", "method", label="{}, mean"),
+        Layer(counts, "tolerance", "mean_iterations", "o-", "method", label=""),
+        Layer(counts, "tolerance", "max_iterations", "o-", "method", label="", look=thin),
+        Layer(
+            *(published, "tolerance", "mean_iterations", "o", "method"),
+            label="{}, published",
+            look=open_dot,
+        ),
+        Layer(published, "tolerance", "max_iterations", "o", "method", label="", look=small),
+        x=Axis("tolerance (1)", log=True),
+        y={
+            "error": Axis("mean R (mm)", MM, log=True),
+            "iterations": Axis("iterations (1)", log=True, least=1.0),
+        },
+        panel="panel",
+        titles={"error": "", "iterations": "iterations: mean, and largest (thin, small)"},
+        columns=2,
+        share="x",
+        height=4.6,
+        looks=looks,
+    )
+
+
+def _cost(cost: pd.DataFrame, looks: Mapping) -> Drawing:
+    """Mean error of every method against what a target costs it."""
+    times = {"single (us)": "alone", "batched (us)": "batch"}
+    keys = ["method", "mean R (mm)"]
+    time = cost.melt(keys, list(times), "how", "cost").replace({"how": times}).assign(panel="time")
+    counts = cost[[*keys, "operations"]].rename(columns={"operations": "cost"})
+    counts = counts.assign(panel="operations")
+    alone, batch = (time[time["how"] == how] for how in times.values())
+    grey, dot = {"color": style.GREY, "linewidth": 0.8, "zorder": 1.5}, {"markersize": 6.5}
+    white = dot | {"markerfacecolor": "white"}
+    return draw(
+        chart,
+        Layer(time, "cost", "mean R (mm)", "-", group="method", label="", look=grey),
+        Layer(counts, "cost", "mean R (mm)", "o", "method", look=dot),
+        Layer(batch, "cost", "mean R (mm)", "o", "method", label="", look=white),
+        Layer(alone, "cost", "mean R (mm)", "o", "method", label="", look=dot),
+        x={
+            "operations": Axis("operations for a target (1)", log=True),
+            "time": Axis("time for a target (us)", log=True),
+        },
+        y=Axis("mean R (mm)", log=True),
+        panel="panel",
+        panels=("operations", "time"),
+        titles={"operations": "", "time": "alone (filled) or in a batch (open)"},
+        columns=2,
+        share="y",
+        height=4.8,
+        looks=looks,
+    )
+
+
+def _sizes(results: Results) -> dict[str, Drawing]:
+    found = {}
+    published = {name: results.published_size(name) for name in results.studies}
+    chosen = {name: size for name, (_, size) in results.studies.items()}
+    for name, (sizes, size) in results.studies.items():
+        found[f"size_selection_{name}"] = draw(
+            kinds.sizes,
+            sizes,
+            chosen=size,
+            published=published[name],
+            titles=_rule(results.networks[name].select.tolerance),
+        )
+    if found:
+        frames = [sizes.assign(network=name) for name, (sizes, _) in results.studies.items()]
+        found["size_selections"] = draw(
+            kinds.sizes,
+            pd.concat(frames),
+            panel="network",
+            chosen=chosen,
+            published=published,
+            titles={name: f"{name}\n{_marks(chosen[name], published[name])}" for name in chosen},
+            band=False,
+        )
+    return found
+
+
+def _rule(tolerance: float) -> str:
+    if tolerance > 0:
+        share = f"{100 * tolerance:g} %"
+        return f"Choice: smallest size with a selection error within {share} of the least"
+    return "Choice: size of the least selection error"
+
+
+def _marks(chosen: int, published: int | None) -> str:
+    return f"chosen {chosen}" + ("" if published is None else f", published {published}")
+
+
+def _race(curves: pd.DataFrame) -> Drawing:
+    ends = curves.groupby("trainer", sort=False).tail(1)
+    return draw(
+        chart,
+        Layer(curves, "seconds", "error", "-", "trainer", look={"linewidth": 1.8}),
+        Layer(ends, "seconds", "error", "o", "trainer", label="", look={"marker": "o"}),
+        x=Axis("time (s)", log=True),
+        y=Axis("root mean square error, normalised (1)", log=True),
+        looks=style.looks(curves["trainer"].unique()),
+        height=5.0,
+    )
+
+
+def _fitting(results: Results) -> Drawing:
+    """Networks of several sizes along a slice (figures 2.9 and 2.10)."""
+    curves, samples = results.fitting, results.slice_samples
+    sizes = sorted(curves["n_hidden"].unique())
+    titles = {n: f"{n} hidden neurons" for n in sizes}
+    if len(sizes) > 1:
+        titles[sizes[0]] += ": too few"
+        titles[sizes[-1]] += ": too many"
+    deflection = samples["tip_y"] - samples["rigid_y"]
+    shown = MM * np.concatenate([curves["model_y"], deflection])
+    low, high = _limits(shown, MM * curves["network_y"].to_numpy())
+    lift = "lift_stroke"
+    ink = {"color": style.INK, "linewidth": 1.0}
+    red, blue = {"color": style.VERMILION, "linewidth": 1.8}, {"markersize": 4.5}
+    held = "grid samples, left out of the training"
+    return draw(
+        chart,
+        Layer(curves, lift, "model_y", "-", label="flexible model", look=ink),
+        Layer(curves, lift, "network_y", "-", label="network", look=red),
+        Layer(samples.assign(y=deflection), lift, "y", "o", label=held, look=blue),
+        x=Axis("lift stroke (m)"),
+        y=Axis("vertical deflection (mm)", MM, limits=(low, high)),
+        panel="n_hidden",
+        panels=sizes,
+        titles=titles,
+        columns=len(sizes),
+        height=3.9,
+    )
+
+
+def _limits(shown: Sequence[float], network: np.ndarray) -> tuple[float, float]:
+    """Limits of y: all truth and samples, and the network no further than half their range."""
+    low, high = float(np.min(shown)), float(np.max(shown))
+    allowed = 0.5 * (high - low)
+    network = np.clip(network, low - allowed, high + allowed)
+    low, high = min(low, float(network.min())), max(high, float(network.max()))
+    margin = 0.05 * (high - low) or 1.0
+    return low - margin, high + margin
