@@ -2,10 +2,23 @@
 
 from pathlib import Path
 
-from flexik.multibody.elastic_arm.assembly import flexible_arm
-from flexik.parameters import load_parameters
+import numpy as np
+
+from flexik.cases.case import load
+from flexik.cases.elastic_arm.parts.arm import flexible_arm
+from flexik.multibody.elastic_arm import equilibria
 
 ROOT = Path(__file__).resolve().parents[1]
-ARM = load_parameters(ROOT / "params.yaml").elastic_arm
-MODEL = flexible_arm(ARM)
+SECTION = load("elastic_arm", ROOT / "params.yaml")
+MODEL = flexible_arm(SECTION.machine)
 GEOMETRY = MODEL.geometry
+
+TARGETS = np.array([[1.1, 0.3], [0.9, 0.7], [1.15, -0.1], [0.6, 0.85]])
+PAYLOAD = np.array([3.0, 0.5, 1.5, 2.2])
+QUERY = np.column_stack([TARGETS, PAYLOAD])
+HOME = np.zeros((4, 2))
+
+
+def tips(angles, payload):
+    """Tip (n, 2) of the flexible arm."""
+    return equilibria(MODEL, angles, payload).tip

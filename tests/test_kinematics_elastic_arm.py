@@ -9,7 +9,6 @@ from flexik.kinematics.elastic_arm import (
     ArmGeometry,
     elbow,
     flexible_forward,
-    forward,
     inverse,
     inverse_by_rule,
 )
@@ -81,24 +80,24 @@ def test_flexible_tip_is_that_of_the_printed_equations():
 def test_rigid_tip_of_plain_poses():
     angles = np.radians([[0.0, 0.0], [90.0, 0.0], [0.0, 90.0], [30.0, -30.0]])
     expected = [[1.19, 0.0], [0.0, 1.19], [0.57, 0.62], [0.57 * np.sqrt(0.75) + 0.62, 0.285]]
-    assert forward(ARM, angles) == pytest.approx(np.array(expected), abs=1e-15)
+    assert ARM.forward(angles) == pytest.approx(np.array(expected), abs=1e-15)
 
 
 @given(st.floats(-3.1, 3.1), st.floats(-3.1, 3.1))
 def test_inverse_of_forward_on_both_elbows(theta_1, theta_2):
     angles = np.array([[theta_1, theta_2]])
-    tip = forward(FREE, angles)
+    tip = FREE.forward(angles)
     for side in (1.0, -1.0):
         found = inverse(FREE, tip, side)
         assert found.status.tolist() == [REACHED]
-        assert forward(FREE, found.angles) == pytest.approx(tip, abs=1e-7)
+        assert FREE.forward(found.angles) == pytest.approx(tip, abs=1e-7)
     own = inverse(FREE, tip, elbow(angles)).angles
     # the root of a stretched arm costs half the digits
     assert np.angle(np.exp(1j * (own - angles))) == pytest.approx(np.zeros((1, 2)), abs=1e-6)
 
 
 def test_elbows_mirror_each_other():
-    tip = forward(ARM, np.radians([[5.0, 20.0]]))
+    tip = ARM.forward(np.radians([[5.0, 20.0]]))
     up, down = inverse(FREE, tip, 1.0).angles[0], inverse(FREE, tip, -1.0).angles[0]
     assert up[1] == pytest.approx(-down[1])
     assert np.degrees(up) == pytest.approx([5.0, 20.0])
@@ -109,9 +108,9 @@ def test_elbows_mirror_each_other():
 def test_rule_takes_the_elbow_farther_inside_the_limits():
     # the first tip has its other elbow at (26, -20) degrees, the second at (-1, 20): nearer -10
     angles = np.radians([[5.0, 20.0], [20.0, -20.0], [0.0, -35.0], [15.0, -40.0], [30.0, 0.0]])
-    found = inverse_by_rule(ARM, forward(ARM, angles))
+    found = inverse_by_rule(ARM, ARM.forward(angles))
     assert found.reached.all()
-    assert forward(ARM, found.angles) == pytest.approx(forward(ARM, angles), abs=1e-12)
+    assert ARM.forward(found.angles) == pytest.approx(ARM.forward(angles), abs=1e-12)
     assert elbow(found.angles).tolist() == [1.0, -1.0, -1.0, -1.0, 1.0]
 
 
@@ -129,11 +128,32 @@ def test_status_and_angles_of_targets_beyond_reach_and_limits():
     found = inverse_by_rule(ARM, targets)
     assert found.status.tolist() == [OUT_OF_REACH, OUT_OF_REACH, ACTUATOR_LIMIT, REACHED]
     assert np.isnan(found.angles).all(axis=1).tolist() == [True, True, False, False]
-    assert forward(ARM, found.angles[2:]) == pytest.approx(targets[2:], abs=1e-12)
+    assert ARM.forward(found.angles[2:]) == pytest.approx(targets[2:], abs=1e-12)
 
 
 def test_limits_admit_the_poses_on_them():
     corners = np.array([[a, b] for a in ARM.limits[0] for b in ARM.limits[1]])
-    found = inverse(ARM, forward(ARM, corners), elbow(corners))
+    found = inverse(ARM, ARM.forward(corners), elbow(corners))
     assert found.reached.all()
     assert found.angles == pytest.approx(corners, abs=1e-9)
+
+
+def test_the_inverse_of_a_manipulator_keeps_what_it_does_not_reach():
+    targets = np.array([[1.1, 0.3], [0.9, 0.5], [1.3, 0.0]])
+    solution = ARM.inverse(targets, np.full((3, 2), 0.1))
+    assert solution.status.tolist() == [REACHED, REACHED, OUT_OF_REACH]
+    assert ARM.forward(solution.values[:2]) == pytest.approx(targets[:2], abs=1e-12)
+    assert solution.values[2].tolist() == [0.1, 0.1]
+
+
+def test_a_correction_does_not_turn_the_elbow_over():
+    """Along a line across the border between the elbows, by the rule of the original target."""
+    line = np.column_stack([np.full(400, 1.12), np.linspace(0.1, 0.35, 400)])
+    side = ARM.branch(inverse_by_rule(ARM, line).angles)[:, 0]
+    border = int(np.flatnonzero(np.diff(side))[0])
+    original, corrected = line[[border]], line[[border + 1]]
+    alone = ARM.inverse(corrected, np.zeros((1, 2)))
+    kept = ARM.inverse(corrected, np.zeros((1, 2)), original)
+    assert ARM.branch(alone.values)[0, 0] == side[border + 1] != side[border]
+    assert ARM.branch(kept.values)[0, 0] == side[border]
+    assert ARM.forward(kept.values) == pytest.approx(corrected, abs=1e-12)

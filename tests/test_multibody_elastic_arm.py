@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from elastic_arm import ARM, GEOMETRY, MODEL
+from elastic_arm import GEOMETRY, MODEL, SECTION
 
 from flexik.errors import SolverError
-from flexik.kinematics.elastic_arm import flexible_forward, forward
-from flexik.multibody.elastic_arm.model import ArmModel, Tube, equilibria, solve
+from flexik.kinematics.elastic_arm import flexible_forward
+from flexik.multibody.elastic_arm import ArmModel, Tube, equilibria, solve
 
 PAYLOADS = np.arange(4.0)  # kg
 A1, A2 = 0.57, 0.62
@@ -69,7 +69,7 @@ def test_tip_is_that_of_the_flexible_forward_equations():
     assert flexible_forward(GEOMETRY, angles, found.deformation) == pytest.approx(
         found.tip, abs=1e-14
     )
-    sag = found.tip - forward(GEOMETRY, angles)
+    sag = found.tip - GEOMETRY.forward(angles)
     assert (sag[:, 1] < 0.0).all() and np.abs(sag).max() < 0.03
 
 
@@ -121,7 +121,7 @@ def test_tube():
     tube = Tube(0.04, 0.02, 0.0015)
     assert tube.second_moment == pytest.approx(1.15e-8, rel=0.005)
     assert 2700 * tube.area == pytest.approx(0.46, abs=0.005)
-    assert ARM.structure.tube.model_dump() == {"width": 0.04, "height": 0.02, "wall": 0.0015}
+    assert SECTION.machine.structure.tube.model_dump() == {"width": 0.04, "height": 0.02, "wall": 0.0015}
 
 
 def test_a_failed_equilibrium_is_a_row_or_an_error(monkeypatch):

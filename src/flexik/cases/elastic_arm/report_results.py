@@ -133,7 +133,7 @@ def read(section: Section) -> Results:
     samples, networks, studies = DATA / "samples", DATA / "networks", DATA / "studies"
     (conditions,) = section.conditions
     errors = DATA / "errors" / conditions
-    training = {name: pd.read_csv(networks / f"{name}.csv") for name in section.networks}
+    training = {name: pd.read_csv(networks / f"{name}.restarts.csv") for name in section.networks}
     fields: dict[str, Any] = {
         name: read_table(studies / f"{name}.parquet")
         for name in ("fit", "sensitivity", "payload_error", "splits")

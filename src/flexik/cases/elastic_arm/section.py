@@ -269,20 +269,16 @@ class Section(Model):
     def _check_methods(self) -> None:
         if not any(given.method == "none" for given in self.methods.values()):
             raise ValueError("methods: none is not there, which the others are compared with")
+        gauges = {k: given for k, given in self.methods.items() if isinstance(given, Gauge)}
+        others = {k: given for k, given in self.methods.items() if k not in gauges}
+        registry.check_methods(others, self.networks)
+        for label, given in gauges.items():
+            if given.network not in self.gauge_networks:
+                raise ValueError(
+                    f"methods.{label}.network: {given.network!r} is no network given gauges "
+                    f"({', '.join(self.gauge_networks)})"
+                )
         for label, given in self.methods.items():
-            network = self.networks.get(given.network or "")
-            if given.needs is None:
-                continue
-            if network is None:
-                raise ValueError(
-                    f"methods.{label}.network: there is no network {given.network!r} "
-                    f"({', '.join(self.networks)})"
-                )
-            if given.needs != ("gauges" if network.has_gauges else network.learns):
-                raise ValueError(
-                    f"methods.{label}.network: {given.network!r} learns {network.learns}, "
-                    f"{given.method} needs {given.needs}"
-                )
             if label in self.networks and given.network != label:
                 raise ValueError(f"methods.{label}: the name of another network than its own")
         for name in (*self.networks, *self.methods):

@@ -1,4 +1,4 @@
-"""Readings of the experiment on the flexible arm, and random targets with what gauges show there."""
+"""Readings of the experiment on the flexible arm, random targets, and what gauges show there."""
 
 import numpy as np
 

@@ -1,0 +1,43 @@
+"""What the networks of the arm are trained with."""
+
+from pathlib import Path
+from typing import Any
+
+from flexik.cases.elastic_arm.parts.kinds import KINDS, LearningData, learning_data
+from flexik.cases.elastic_arm.section import Network, Section
+from flexik.learning.perceptron import quantities
+from flexik.learning.training import Architecture, Lesson
+from flexik.parameters.trainers import Stopping
+
+SAMPLES = "data/elastic_arm/samples"
+
+
+def described(section: Section, name: str, trainer: str) -> dict[str, dict[str, Any]]:
+    """Settings and inputs of what trains network `name` by `trainer`."""
+    network = section.networks[name]
+    shown = f"{SAMPLES}/readings.{network.readings}.parquet"
+    return {
+        "settings": {"network": network, "trainer": section.trainers[trainer]},
+        "inputs": {"readings": f"{SAMPLES}/readings.parquet", "shown": shown},
+    }
+
+
+def lesson(
+    network: Network, n_hidden: tuple[int, ...], trainer: Stopping, data: LearningData
+) -> Lesson:
+    """Training of `network` with `n_hidden` units by the readings of `data`; none is held out."""
+    kind = KINDS[str(network.learns)]
+    return Lesson(
+        *data.training,
+        quantities(kind.inputs),
+        quantities(kind.outputs),
+        Architecture(n_hidden if len(n_hidden) > 1 else n_hidden[0], network.activation),
+        trainer,
+        network.seed,
+        data.selection,
+    )
+
+
+def data_of(network: Network, readings: Path, shown: Path) -> LearningData:
+    """All readings as `network` learns them."""
+    return learning_data(str(network.learns), readings, shown)

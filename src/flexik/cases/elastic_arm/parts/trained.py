@@ -1,0 +1,51 @@
+"""Trained networks of the arm: those of all starts."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from flexik.cases.elastic_arm.section import Network
+from flexik.datasets.tables import Field
+from flexik.learning import perceptron
+from flexik.learning.storage import load_network, load_restarts
+
+NETWORKS = "data/elastic_arm/networks"
+RESTART = (
+    Field("restart", "1", "number of the start, from 0", "int64"),
+    Field("chosen", "1", "1: of the least selection error, else 0", "int64"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Trained:
+    """Network `name` from one of its starts; `is_chosen`: the one of least selection error."""
+
+    name: str
+    settings: Network
+    restart: int
+    is_chosen: bool
+    network: perceptron.Network
+
+    @property
+    def learns(self) -> str:
+        """Key of KINDS."""
+        return str(self.settings.learns)
+
+    @property
+    def row(self) -> dict[str, list[int]]:
+        """Columns RESTART."""
+        return {"restart": [self.restart], "chosen": [int(self.is_chosen)]}
+
+
+def files_of(name: str) -> dict[str, str]:
+    """Files of network `name`, as inputs of a part."""
+    return {"chosen": f"{NETWORKS}/{name}.json", "all": f"{NETWORKS}/{name}.restarts.json"}
+
+
+def restarts(name: str, settings: Network, files: Mapping[str, Path]) -> list[Trained]:
+    """Networks of all starts of network `name` that gave one."""
+    chosen = load_network(files["chosen"])[1].restart
+    return [
+        Trained(name, settings, restart, restart == chosen, network)
+        for restart, network in load_restarts(files["all"]).items()
+    ]
