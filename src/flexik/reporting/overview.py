@@ -1,134 +1,85 @@
-"""What all cases reached beside the published values, for the README."""
+"""The blocks of README.md that the pipeline keeps up to date.
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+Between `<!-- flexik:NAME -->` and `<!-- /flexik:NAME -->` stands the table reports/NAME.md, or, for
+`overview`, what all cases reached beside the published values: the rows of cases/*/overview.csv.
+"""
+
+import re
+from fnmatch import fnmatch
+from pathlib import Path
 
 import pandas as pd
 
+from flexik.errors import DataError
+from flexik.files import read_json, write_text
 from flexik.reporting.tables import markdown
 
-NOT_AVAILABLE = "not available"
+REPORTS, REFERENCE = Path("reports"), Path("data/reference")
+CASES = Path(__file__).parents[1] / "cases"
 ABSENT = "not in this run"
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A row: what is measured, the metric of a case that holds it, and how it is written.
-
-    published : name of the published value, if there is one.
-    scale : to the unit of `what`.
-    """
-
-    case: str
-    what: str
-    metric: str
-    form: str
-    published: str | None = None
-    scale: float = 1.0
+def update(readme: Path | str) -> None:
+    """Renew all blocks of `readme`; raises DataError if a file is missing."""
+    try:
+        text = Path(readme).read_text(encoding="utf-8")
+        for name in re.findall(r"<!-- flexik:(\S+) -->", text):
+            overview_or_table = (
+                overview() if name == "overview" else (REPORTS / f"{name}.md").read_text("utf-8")
+            )
+            text = replace_block(text, name, overview_or_table)
+    except OSError as error:
+        raise DataError(f"{error.filename}: cannot be read ({error.strerror})") from None
+    write_text(readme, text)
 
 
-CASES = {
-    "crane": "[log crane](reports/crane/README.md) (Rouvinen)",
-    "elastic_arm": "[elastic two-link arm](reports/elastic_arm/README.md) (Al-Khafaji, Jweeg)",
-    "smartee": "[parallel manipulator](reports/smartee/README.md) (De Luca and others)",
-    "fanuc": "[six-joint arm](reports/fanuc/README.md) (Hasan)",
-}
-_MEAN = "mean_error_mm"
-ENTRIES = (
-    Entry("crane", "mean error, not compensated (mm)", f"none.{_MEAN}", ".2f", "none"),
-    Entry("crane", "mean error, `combined` (mm)", f"combined.{_MEAN}", ".2f", "combined"),
-    Entry("crane", "the same, size by selection error (mm)", f"combined_selected.{_MEAN}", ".2f"),
-    Entry(
-        "crane",
-        "measured: mean error with compensation (mm)",
-        f"measured.combined.{_MEAN}",
-        ".1f",
-        "measured",
-    ),
-    Entry("crane", "measured: adapted by 9 points (mm)", f"measured.adapted_9.{_MEAN}", ".1f"),
-    Entry(
-        "elastic_arm",
-        "R of theta_1, held-out readings",
-        "published_network.r_theta1",
-        ".6f",
-        "r_theta_1",
-    ),
-    Entry(
-        "elastic_arm",
-        "R of theta_2, held-out readings",
-        "published_network.r_theta2",
-        ".6f",
-        "r_theta_2",
-    ),
-    Entry(
-        "elastic_arm", "mean tip error without gauges, `combined` (mm)", f"combined.{_MEAN}", ".2f"
-    ),
-    Entry("smartee", "peak elbow error (mrad)", "network.peak_elbow_rad", ".2f", "elbow", 1e3),
-    Entry("smartee", "peak position error (mm)", "network.peak_position_mm", ".3f", "position"),
-    Entry(
-        "smartee",
-        "peak elbow error, best trainer and data (mrad)",
-        "best.peak_elbow_rad",
-        ".2f",
-        None,
-        1e3,
-    ),
-    Entry(
-        "smartee", "the published network and 2 Newton steps (rad)", "newton2.peak_elbow_rad", ".0e"
-    ),
-    Entry(
-        "fanuc",
-        "total error of the joints, one network a joint (%)",
-        "config1",
-        ".2f",
-        NOT_AVAILABLE,
-    ),
-    Entry(
-        "fanuc",
-        "total error of the joints, one network for all (%)",
-        "config2",
-        ".2f",
-        NOT_AVAILABLE,
-    ),
-)
-
-
-def overview(metrics: Mapping[str, Mapping[str, float]], published: Mapping[str, float]) -> str:
+def overview() -> str:
     """Table in Markdown.
 
-    Parameters
-    ----------
-    metrics
-        Of every case of CASES.
-    published
-        Values by the names in ENTRIES, in the unit of the metric.
-
-    A metric that a run with other parameters does not have is told as such.
+    Columns of cases/NAME/overview.csv: case, what (with its unit), metric (with * the mean of all
+    that match), form of the number, scale to the unit, published (FILE ROW COLUMN [SCALE] in
+    data/reference/NAME, or a text).
     """
     rows = []
-    for entry in ENTRIES:
-        known = ""
-        if entry.published == NOT_AVAILABLE:
-            known = NOT_AVAILABLE
-        elif entry.published is not None:
-            known = format(entry.scale * published[entry.published], "g")
-        value = _value(metrics[entry.case], entry)
-        rows.append(
-            {
-                "case": CASES[entry.case],
-                "what": entry.what,
-                "published": known,
-                "flexik": ABSENT if value is None else format(entry.scale * value, entry.form),
-            }
-        )
+    for file in sorted(CASES.glob("*/overview.csv")):
+        metrics = read_json(REPORTS / file.parent.name / "metrics.json")
+        for entry in pd.read_csv(file, dtype=str, keep_default_na=False).to_dict("records"):
+            found = [v for name, v in metrics.items() if fnmatch(name, entry["metric"])]
+            value = float(entry["scale"]) * sum(found) / len(found) if found else None
+            rows.append(
+                {
+                    "case": entry["case"],
+                    "what": entry["what"],
+                    "published": _published(file.parent.name, entry["published"]),
+                    "flexik": ABSENT if value is None else format(value, entry["form"]),
+                }
+            )
     return markdown(pd.DataFrame(rows))
 
 
-def _value(metrics: Mapping[str, float], entry: Entry) -> float | None:
-    """A metric, or None; of the six-joint arm the mean over its joints."""
-    names = [entry.metric]
-    if entry.case == "fanuc":
-        names = [f"{entry.metric}.joint{k}_error_percent" for k in range(1, 7)]
-    if any(name not in metrics for name in names):
-        return None
-    return sum(metrics[name] for name in names) / len(names)
+def _published(case: str, where: str) -> str:
+    """The value that FILE ROW COLUMN [SCALE] tells, or the text itself."""
+    file, *place = where.split(" ")
+    if not file.endswith(".csv"):
+        return where
+    row, column, scale = [*place, "1"][:3]
+    table = pd.read_csv(REFERENCE / case / file, index_col=0)
+    return format(float(scale) * float(table.loc[row, column]), "g")
+
+
+def replace_block(text: str, name: str, new: str) -> str:
+    """`text` with `new` between the markers of `name`.
+
+    Raises DataError unless `text` has each marker once, in this order, and `new` has neither.
+    """
+    start, end = f"<!-- flexik:{name} -->", f"<!-- /flexik:{name} -->"
+    for marker in (start, end):
+        if (count := text.count(marker)) != 1:
+            raise DataError(f"expected the marker {marker} once, found it {count} times")
+        if marker in new:
+            raise DataError(f"the new text holds the marker {marker} itself")
+    before, rest = text.split(start)
+    if end not in rest:
+        raise DataError(f"expected the marker {end} after {start}")
+    # blank lines, or Markdown takes the text for part of the comment
+    return f"{before}{start}\n\n{new.strip(chr(10))}\n\n{end}{rest.split(end)[1]}"
