@@ -18,14 +18,7 @@ from flexik.kinematics.smartee import (
     leg_tip_velocities,
     leg_tips,
 )
-
-CONVERGED, NOT_CONVERGED, SINGULAR, OTHER_BRANCH = 0, 1, 2, 3
-STATUS_MEANING = {
-    CONVERGED: "converged",
-    NOT_CONVERGED: "the closure error is still above the tolerance",
-    SINGULAR: "the closure equations do not determine the elbows",
-    OTHER_BRANCH: "converged to an elbow outside (-pi, 0), which the joints do not reach",
-}
+from flexik.kinematics.status import NOT_CONVERGED, OTHER_BRANCH, REACHED, SINGULAR
 
 # Determinant below which the closure equations are singular; 1 is for tips that move straight
 # apart
@@ -37,8 +30,8 @@ class Direct(NamedTuple):
 
     Attributes
     ----------
-    elbows : (n, 3) in rad; where the status is not CONVERGED those of the last step that was finite
-    status : (n,) one of STATUS_MEANING
+    elbows : (n, 3) in rad; where the status is not REACHED those of the last step that was finite
+    status : (n,) of kinematics.status; OTHER_BRANCH: an elbow outside (-pi, 0)
     n_steps : (n,) Newton steps made
     residual : (n,) largest closure error over the squared side of the plate
     """
@@ -90,7 +83,7 @@ def solve_elbows(
         errors = np.abs(closure(tips, geometry.side)).max(axis=1)
         residual[open_rows] = errors / geometry.side**2
         going_on = residual[open_rows] > tolerance
-        status[open_rows[~going_on]] = CONVERGED
+        status[open_rows[~going_on]] = REACHED
         if step == n_steps or not going_on.any():
             break
         rows = open_rows[going_on]
@@ -102,7 +95,7 @@ def solve_elbows(
         steps[open_rows] += 1
     # angles a turn apart are the same elbow
     elbows = wrapped(elbows)
-    other = (status == CONVERGED) & (elbows >= 0.0).any(axis=1)
+    other = (status == REACHED) & (elbows >= 0.0).any(axis=1)
     status[other] = OTHER_BRANCH
     return Direct(elbows, status, steps, residual)
 
@@ -116,9 +109,9 @@ def closed(
     """
     tips = leg_tips(elbow_circles(geometry, actuated), elbows)
     residual = np.abs(closure(tips, geometry.side)).max(axis=1) / geometry.side**2
-    status = np.where(residual <= tolerance, CONVERGED, NOT_CONVERGED)
+    status = np.where(residual <= tolerance, REACHED, NOT_CONVERGED)
     status[np.isnan(residual)] = SINGULAR
-    status[(status == CONVERGED) & (wrapped(elbows) >= 0.0).any(axis=1)] = OTHER_BRANCH
+    status[(status == REACHED) & (wrapped(elbows) >= 0.0).any(axis=1)] = OTHER_BRANCH
     return status, residual
 
 

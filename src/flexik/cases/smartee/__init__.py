@@ -1,0 +1,1 @@
+"""The parallel manipulator SmartEE of De Luca, Mattone and Sciandrone."""

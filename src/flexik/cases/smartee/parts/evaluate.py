@@ -1,0 +1,104 @@
+"""Errors of the direct kinematics of the SmartEE, and their spread over restarts of a training."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexik.cases.smartee.parts.errors import COLUMNS, conditions_of, errors, judge_of
+from flexik.cases.smartee.parts.methods import method, network_file
+from flexik.cases.smartee.parts.poses import (
+    ACTUATED_FIELDS,
+    ELBOW_FIELDS,
+    POSE_FIELDS,
+    SAMPLES,
+    actuated_of,
+    centre_elbows,
+    extent_of,
+    geometry_of,
+    values,
+)
+from flexik.cases.smartee.section import CORNERS, RANDOM, VALIDATION, Box, Machine, Method, Section
+from flexik.datasets.parts import Part, Work, Writer, table, whole
+from flexik.datasets.tables import Field, read_table
+from flexik.evaluation.errors import evaluate, fields_of
+from flexik.learning.storage import load_network, load_restarts
+
+N_STEPS = Field("n_steps", "1", "Newton steps at most", "int64")
+EXTENT = Field("extent", "1", "largest coordinate of the pose, in half extents of the box")
+# Largest errors of the network of every restart
+RESTARTS = "restarts"
+RESTART_FIELDS = (
+    Field("restart", "1", "number of the start, from 0", "int64"),
+    Field("conditions", "1", "name of the set of poses", "string"),
+    *(Field(f.name, f.unit, f"largest {f.description}") for f in COLUMNS.errors),
+)
+
+
+def parts(section: Section) -> list[Part]:
+    """Parts CONDITIONS/METHOD, and restarts/NETWORK."""
+    shared = {"machine": section.machine, "box": section.samples.box}
+    found = []
+    for name, settings in section.methods.items():
+        file = network_file(settings)
+        network = {} if file is None else {"network": file}
+        for conditions in settings.conditions or section.conditions:
+            inputs = {"rows": SAMPLES / f"{conditions}.parquet", **network}
+            given = {**shared, "settings": settings}
+            found.append(Part(f"{conditions}/{name}", prepare_errors, given, inputs))
+    rows = {name: SAMPLES / f"{name}.parquet" for name in (VALIDATION, RANDOM, CORNERS)}
+    for name in section.networks:
+        restarts = f"data/smartee/networks/{name}.restarts.json"
+        files = {"restarts": restarts, "rows": rows}
+        found.append(
+            Part(f"{RESTARTS}/{name}", prepare_restarts, {"machine": section.machine}, files)
+        )
+    return found
+
+
+def prepare_errors(
+    *, machine: Machine, box: Box, settings: Method, rows: Path, network: Path | None = None
+) -> Work:
+    """Errors of a method, by each of its numbers of steps, on a set of conditions."""
+    return whole(judged, machine=machine, box=box, settings=settings, rows=rows, network=network)
+
+
+def judged(
+    machine: Machine, box: Box, settings: Method, rows: Path, network: Path | None
+) -> dict[str, Writer]:
+    """Table of errors, a row a number of steps and a pose; the queries stand in `rows`."""
+    poses = read_table(rows)
+    conditions = conditions_of(poses, centre_elbows(machine, box))
+    judge = judge_of(geometry_of(machine), poses)
+    trained = None if network is None else load_network(network)[0]
+    extent = extent_of(box, values(poses, POSE_FIELDS))
+    tables: list[dict[str, NDArray]] = []
+    for n_steps in settings.n_steps:
+        asked = method(machine, settings, n_steps, trained)
+        tables.append(evaluate(asked, conditions, judge, COLUMNS))
+        tables[-1] |= {N_STEPS.name: np.full(len(poses), n_steps), EXTENT.name: extent}
+    queries = {field.name for field in COLUMNS.query}
+    known = fields_of(tables[0], COLUMNS)
+    fields = [N_STEPS, EXTENT, *(f for f in known if f.name not in {*queries, "n_steps", "extent"})]
+    columns = {f.name: np.concatenate([t[f.name] for t in tables]) for f in fields}
+    return {".parquet": table(columns, fields)}
+
+
+def prepare_restarts(*, machine: Machine, restarts: Path, rows: dict[str, Path]) -> Work:
+    """Largest errors of the networks of all restarts, those that were not chosen too."""
+    return whole(largest, machine=machine, restarts=restarts, rows=rows)
+
+
+def largest(machine: Machine, restarts: Path, rows: dict[str, Path]) -> dict[str, Writer]:
+    """Table RESTART_FIELDS."""
+    found: list[tuple[object, ...]] = []
+    for conditions, file in rows.items():
+        poses = read_table(file)
+        query, expected = values(poses, ACTUATED_FIELDS), values(poses, ELBOW_FIELDS)
+        for number, network in load_restarts(restarts).items():
+            given = values(poses, POSE_FIELDS), actuated_of(query), expected, network.predict(query)
+            by_name = errors(geometry_of(machine), *given)
+            peaks = (by_name[field.name].max() for field in COLUMNS.errors)
+            found.append((number, conditions, *peaks))
+    columns = zip(RESTART_FIELDS, zip(*found, strict=True), strict=True)
+    return {".parquet": table({f.name: np.array(v) for f, v in columns}, RESTART_FIELDS)}

@@ -1,0 +1,30 @@
+"""Poses of the SmartEE to learn from and to judge by."""
+
+from flexik.cases.smartee.parts.poses import FIELDS, table
+from flexik.cases.smartee.section import Box, Machine, Poses, Section
+from flexik.datasets import parts as engine
+from flexik.datasets.parts import Part, Work, Writer, whole
+
+
+def parts(section: Section) -> list[Part]:
+    """A part a set of poses, of the samples and of the conditions."""
+    sets = {
+        f"smartee.samples.poses.{name}": poses for name, poses in section.samples.poses.items()
+    } | {f"smartee.conditions.{name}": poses for name, poses in section.conditions.items()}
+    shared = {"machine": section.machine, "box": section.samples.box}
+    return [
+        Part(key.rpartition(".")[2], prepare, {**shared, "poses": poses, "key": key})
+        for key, poses in sets.items()
+    ]
+
+
+def prepare(machine: Machine, box: Box, poses: Poses, key: str) -> Work:
+    """Draw the poses and compute their joint angles."""
+    return whole(draw, machine=machine, box=box, poses=poses, key=key)
+
+
+def draw(machine: Machine, box: Box, poses: Poses, key: str) -> dict[str, Writer]:
+    """The file of a set of poses."""
+    columns = table(machine, box, poses, key)
+    print(f"{key.rpartition('.')[2]}: {len(columns['pose'])} rows")
+    return {".parquet": engine.table(columns, FIELDS)}

@@ -1,0 +1,225 @@
+"""Studies of the SmartEE's trainings in its report: initial weights, constants, sizes."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from flexik.cases.smartee.report_results import Results, scientific
+from flexik.cases.smartee.section import SELECTION
+from flexik.learning.starts import by_trainer
+from flexik.reporting.report import Content
+from flexik.reporting.style import MM
+from flexik.reporting.tables import Table
+
+PENALISED, UNPENALISED = "regularised_cg", "unpenalised_cg"
+# A median error this near, relatively, to that of the best linear map is at its plateau
+PLATEAU = 0.1
+CAPPED = "iterations"
+
+
+def content(results: Results) -> Content:
+    """Tables, metrics and values."""
+    decimals = {"success (%)": 1, "median elbow peak (mrad)": 2, "seconds a run": 2}
+    tables = {
+        "starts": Table(starts(results), decimals),
+        "thresholds": Table(thresholds(results), 1),
+        "sensitivity": Table(sensitivity(results), 1),
+        "sizes": Table(sizes(results), 6),
+    }
+    return Content(tables, metrics=metrics(results), values=values(results))
+
+
+def metrics(results: Results) -> dict[str, float]:
+    """Share of success and median error of every trainer and spread, four digits."""
+    found = {}
+    for row in by_trainer(results.starts).to_dict("records"):
+        for name in ("success_share", "median_error"):
+            key = f"starts.{row['trainer']}.{row['spread']}.{name}"
+            found[key] = float(f"{row[name]:.4g}")
+    return found
+
+
+def starts(results: Results) -> pd.DataFrame:
+    """A row for every trainer and spread, with the times of the benchmark."""
+    times = results.training_times.set_index(["trainer", "spread"])
+    reasons = results.starts.groupby(["trainer", "spread"])["stop_reason"].agg(_counted)
+    rows = []
+    for row in by_trainer(results.starts).to_dict("records"):
+        key = row["trainer"], row["spread"]
+        time = times.loc[key] if key in times.index else pd.Series(dtype=float)
+        first = float(row["median_success_iteration"])
+        rows.append(
+            {
+                "trainer": row["trainer"],
+                "start": row["spread"],
+                "success (%)": 100.0 * float(row["success_share"]),
+                "least error": scientific(row["least_error"]),
+                "median error": scientific(row["median_error"]),
+                "largest error": scientific(row["largest_error"]),
+                "median elbow peak (mrad)": MM * float(row["median_judged"]),
+                "iterations": str(results.section.trainers[row["trainer"]].n_iterations),
+                "to success": "" if np.isnan(first) else f"{first:.0f}",
+                "ended by": reasons[key],
+                "seconds a run": float(time.get("seconds", np.nan)),
+                "median error of long runs": scientific(float(time.get("long_error", np.nan))),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def thresholds(results: Results) -> pd.DataFrame:
+    """Share (%) of the starts that end at or below each error, a row a trainer and spread."""
+    rows = []
+    for (trainer, spread), group in results.starts.groupby(["trainer", "spread"], sort=False):
+        shares = {f"{v:g} (%)": _share(group["error"], v) for v in _limits(results)}
+        rows.append({"trainer": trainer, "start": spread, **shares})
+    return pd.DataFrame(rows)
+
+
+def sensitivity(results: Results) -> pd.DataFrame:
+    """A row for every pair of the two constants: what the same starts come to."""
+    rows = []
+    for pair, group in results.sensitivity.groupby("trainer", sort=False):
+        penalty, decrease = str(pair).split(", ")
+        row: dict[str, object] = {"p": penalty, "tau": decrease}
+        row["success (%)"] = _share(group["error"], results.section.studies.starts.success)
+        for name, error in zip(("least", "median", "largest"), _three(group["error"]), strict=True):
+            row[f"{name} error"] = scientific(error)
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def sizes(results: Results) -> pd.DataFrame:
+    """A row for every size: of each of the sets of rows to learn from."""
+    names = {
+        "training_error": "training",
+        "selection_error": "selection, best start",
+        "worst_selection_error": "selection, worst start",
+    }
+    parts = []
+    for poses, table in results.sizes.groupby("poses", sort=False):
+        labels = {column: f"{poses}: {label}" for column, label in names.items()}
+        parts.append(table.set_index("n_hidden")[list(names)].rename(columns=labels))
+    return pd.concat(parts, axis=1).rename_axis("M").reset_index()
+
+
+def values(results: Results) -> dict[str, Any]:
+    """Numbers for the sentences."""
+    own, table = results.section.studies.starts, by_trainer(results.starts)
+    times = results.training_times
+    reached = times["long_error"] <= own.success
+    return {
+        "starts": own,
+        "untuned": [name for name in own.trainers if name not in own.tuned],
+        "penalised": PENALISED,
+        "unpenalised": UNPENALISED,
+        "differing": _differing(results),
+        "penalty": _penalty(results),
+        "n_runs": len(results.starts),
+        "all_capped": set(results.starts["stop_reason"]) == {CAPPED},
+        "linear_error": results.linear_error,
+        "plateaus": [
+            row
+            for row in table.to_dict("records")
+            if abs(row["median_error"] / results.linear_error - 1.0) <= PLATEAU
+        ],
+        "seconds": times["seconds"].tolist(),
+        "long": times[["n_starts", "long_factor"]].astype(int).to_dict("records")[:1],
+        "long_runs": [
+            (what, [f"{row.trainer} ({row.spread})" for row in times[rows].itertuples()])
+            for what, rows in (("get there", reached), ("do not", ~reached))
+        ],
+        "long_ratios": _long_ratios(results),
+        "other_constants": _other_constants(results),
+        "sizes": [_size(results, str(k), v) for k, v in results.sizes.groupby("poses", sort=False)],
+    }
+
+
+def _differing(results: Results) -> list[str]:
+    """Settings in which the two trainers with the same minimiser differ."""
+    trainers = results.section.trainers
+    if not {PENALISED, UNPENALISED} <= trainers.keys():
+        return []
+    one, other = (dict(trainers[name]) for name in (PENALISED, UNPENALISED))
+    return [f"{key} ({one[key]} and {other.get(key)})" for key in one if one[key] != other.get(key)]
+
+
+def _penalty(results: Results) -> list[dict[str, Any]]:
+    """What the penalty does from the starts of each spread, and in how many starts."""
+    found = []
+    for spread in results.section.studies.starts.spreads:
+        rows = results.starts[results.starts["spread"] == spread]
+        errors = [rows.loc[rows["trainer"] == name, "error"] for name in (PENALISED, UNPENALISED)]
+        if len(errors[0]) and len(errors[1]):
+            medians = [series.median() for series in errors]
+            lower = errors[0].to_numpy() < errors[1].to_numpy()
+            shares = {limit: [_share(e, limit) for e in errors] for limit in _limits(results)}
+            both = {"ratio": medians[0] / medians[1], "n_lower": int(lower.sum())}
+            found.append({"spread": spread, "n_starts": len(lower), "shares": shares, **both})
+    return found
+
+
+def _limits(results: Results) -> list[float]:
+    own = results.section.studies.starts
+    return sorted({own.success, *own.thresholds}, reverse=True)
+
+
+def _long_ratios(results: Results) -> list[str]:
+    """Median error of long runs from the farthest starts over that from the nearest."""
+    own = results.section.studies.starts
+    near, far = (choose(own.spreads, key=own.spreads.__getitem__) for choose in (min, max))
+    rows = results.training_times.to_dict("records")
+    errors = {(row["trainer"], row["spread"]): row["long_error"] for row in rows}
+    return [
+        f"{trainer} {errors[trainer, far] / errors[trainer, near]:.1f}"
+        for trainer in own.trainers
+        if near != far and (trainer, near) in errors and (trainer, far) in errors
+    ]
+
+
+def _other_constants(results: Results) -> dict[str, Any]:
+    """How much hangs on the constants the paper does not give."""
+    chosen, table = results.section.studies.sensitivity, sensitivity(results)
+    same = results.starts.query("spread == @chosen.spread and start < @chosen.n_starts")
+    medians = same.groupby("trainer")["error"].median()
+    errors = results.sensitivity.groupby("trainer")["error"].median()
+    without = float(medians.get(UNPENALISED, np.nan))
+    return {
+        "chosen": chosen,
+        "trainer": results.section.trainers[chosen.trainer],
+        "shares": [table["success (%)"].min(), table["success (%)"].max()],
+        "without": without,
+        "n_lower": int((errors < without).sum()),
+        "n_pairs": len(errors),
+    }
+
+
+def _size(results: Results, poses: str, table: pd.DataFrame) -> dict[str, Any]:
+    """Where the selection error is least, and what it is over the training error."""
+    best = table["n_hidden"].to_numpy()[table["selection_error"].argmin()]
+    ratio = table["selection_error"] / table["training_error"]
+    samples = results.section.samples.poses
+    return {
+        "poses": poses,
+        "n_poses": samples[poses].n_poses,
+        "best": int(best),
+        "largest": bool(best == table["n_hidden"].max()),
+        "ratios": [ratio.min(), ratio.max()],
+        "extents": [samples[poses].extent, samples[SELECTION].extent],
+    }
+
+
+def _three(errors: pd.Series) -> tuple[float, float, float]:
+    return errors.min(), errors.median(), errors.max()
+
+
+def _share(errors: pd.Series, limit: float) -> float:
+    """Of errors at or below `limit`, %; a run that failed (NaN) is above."""
+    return 100.0 * float((errors <= limit).mean())
+
+
+def _counted(reasons: Sequence[str]) -> str:
+    counts = pd.Series(reasons).value_counts()
+    return ", ".join(f"{reason}: {count}" for reason, count in sorted(counts.items()))

@@ -1,1 +1,0 @@
-"""Errors of the direct kinematics of the SmartEE."""

@@ -1,1 +1,0 @@
-"""Direct kinematics of the SmartEE: network, Newton, and both together."""
