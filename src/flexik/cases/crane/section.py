@@ -15,6 +15,7 @@ from flexik.multibody.beams import read_section
 from flexik.parameters.conditions import ConditionSet, Points, RandomTargets, check_different
 from flexik.parameters.model import Count, Model, Name, NotNegative, Positive, Seed, Share
 from flexik.parameters.networks import Axis, Network, check_networks
+from flexik.parameters.trainers import Trainer
 from flexik.positioning.combined import Settings as Combined
 from flexik.positioning.inverted_network import InvertedSettings
 from flexik.positioning.registry import Methods, check_methods
@@ -143,7 +144,7 @@ class Section(Model):
     """The log crane."""
 
     machine: Machine
-    trainers: dict[Name, Any]
+    trainers: dict[Name, Trainer]
     calibration: Calibration = Calibration()
     samples: Samples
     networks: Annotated[dict[Name, CraneNetwork], Field(min_length=1)]

@@ -1,7 +1,6 @@
 """What the networks of the crane learn from: inputs and outputs of training and selection set."""
 
 import functools
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -13,6 +12,9 @@ from numpy.typing import NDArray
 from flexik.cases.crane.parts.fields import SAMPLE_FIELDS, STROKES, deflection, kept
 from flexik.datasets.tables import Field, read_table
 from flexik.kinematics.crane import CraneGeometry, forward, inverse
+from flexik.learning.perceptron import quantities
+from flexik.learning.training import Architecture, Lesson
+from flexik.parameters.trainers import Stopping
 
 Array = NDArray[np.float64]
 
@@ -71,24 +73,17 @@ class Predictor(Protocol):
         ...
 
 
-@dataclass(frozen=True, eq=False)
-class LearningData:
-    """Inputs (n, p) and outputs (n, q) to train with, and (m, p), (m, q) to select by; SI units.
-
-    judge : selection error of a network where the error of its outputs is not what counts.
-    """
-
-    inputs: Array
-    outputs: Array
-    selection_inputs: Array
-    selection_outputs: Array
-    judge: Callable[[Predictor], float] | None = None
-
-
-def read_learning_data(
-    grid: Path, selection: Path, geometry: CraneGeometry, kind: str, rigid: Predictor | None = None
-) -> LearningData:
-    """Data of a network of `kind` (one of KINDS) from the tables `grid` and `selection`.
+def lesson(
+    kind: str,
+    architecture: Architecture,
+    trainer: Stopping,
+    seed: int,
+    geometry: CraneGeometry,
+    grid: Path,
+    selection: Path,
+    rigid: Predictor | None = None,
+) -> Lesson:
+    """What a network of `kind` (one of KINDS) learns from the table `grid`, chosen by `selection`.
 
     `rigid` is the trained rigid network that a correction corrects, its errors included
     (Rouvinen 1999, chapter 4.3); only kind `correction` needs it.
@@ -99,7 +94,17 @@ def read_learning_data(
     if kind == "coordinates":
         reach = np.ptp(tables[0][["tip_x", "tip_y"]].to_numpy(), axis=0) / 2.0
         judge = functools.partial(stroke_error_at_tip, geometry, *chosen_by, reach)
-    return LearningData(inputs, outputs, *chosen_by, judge)
+    return Lesson(
+        inputs,
+        outputs,
+        quantities(KINDS[kind].inputs),
+        quantities(KINDS[kind].outputs),
+        architecture,
+        trainer,
+        seed,
+        chosen_by,
+        judge,
+    )
 
 
 def stroke_error_at_tip(
