@@ -67,10 +67,16 @@ def load_all(file: Path | str = PARAMETERS_FILE) -> dict[str, Any]:
 
 def load_parallel(file: Path | str = PARAMETERS_FILE) -> ParallelSettings:
     """Where to compute; raises ParameterError as `load` does."""
-    data = {"parallel": _read(file).get("parallel", {})}
-    found = validated(
-        dict[str, ParallelSettings], data, lambda location: (str(file), ".".join(location))
-    )
+    given = {"parallel": _read(file).get("parallel", {})}
+    try:
+        found = validated(
+            dict[str, ParallelSettings], given, lambda location: (str(file), ".".join(location))
+        )
+    except ParameterError as error:
+        text = str(error)
+        raise ParameterError(
+            text if text.startswith(f"{file}: ") else f"{file}: parallel: {text}"
+        ) from None
     return found["parallel"]
 
 

@@ -40,21 +40,37 @@ def validated(model: type[T], data: Any, source: Callable[[list[str]], tuple[str
     try:
         return TypeAdapter(model).validate_python(data)
     except ValidationError as error:
-        lines = []
+        found = []
         for detail in error.errors():
-            location = _keys(detail["loc"], data)
+            location = _keys(detail["loc"], data, detail["type"] == "missing")
             message = detail["msg"].removeprefix("Value error, ")
             if detail["type"] == "value_error":  # our own: "key within the section: what is wrong"
                 within, _, message = message.partition(": ")
                 location += within.split(".")
-            file, key = source(location)
             given = detail["input"]
             shown = f", got {given!r}" if not isinstance(given, dict | list | BaseModel) else ""
-            lines.append(f"{file}: {key or 'top level'}: {message}{shown}")
+            found.append((location, detail["type"].endswith(_OF_TYPE), f"{message}{shown}"))
+        lines = []
+        for location, _, message in _likeliest(found):
+            file, key = source(location)
+            lines.append(f"{file}: {key or 'top level'}: {message}")
         raise ParameterError("\n".join(lines)) from None
 
 
-def _keys(location: Sequence[int | str], data: Any) -> list[str]:
+_OF_TYPE = ("_type", "_parsing", "_from_float")
+Mistake = tuple[list[str], bool, str]
+
+
+def _likeliest(found: Sequence[Mistake]) -> list[Mistake]:
+    """One mistake a key: where a value may be of several types, pydantic tells one for each."""
+    kept: list[Mistake] = []
+    for location, of_type, message in sorted(found, key=lambda mistake: mistake[1]):
+        if not (of_type and any(other[: len(location)] == location for other, _, _ in kept)):
+            kept.append((location, of_type, message))
+    return sorted(kept, key=found.index)
+
+
+def _keys(location: Sequence[int | str], data: Any, last_missing: bool) -> list[str]:
     """The keys of a location in `data`, without the kinds pydantic adds where there are several."""
     found = []
     for number, part in enumerate(location):
@@ -63,7 +79,7 @@ def _keys(location: Sequence[int | str], data: Any) -> list[str]:
             inside = part < len(data)
         if inside:
             data = data[part]
-        if inside or number == len(location) - 1:  # a missing key is the last
+        if inside or (last_missing and number == len(location) - 1):
             found.append(str(part))
     return found
 
