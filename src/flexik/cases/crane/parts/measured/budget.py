@@ -15,7 +15,8 @@ from flexik.cases.crane.parts.measured.errors import campaign_errors
 from flexik.cases.crane.parts.measured.fields import BUDGET, MEASURED
 from flexik.cases.crane.parts.measured.nominal import read_network
 from flexik.cases.crane.parts.measured.twins import measured_tips, twin_and_generator
-from flexik.datasets.parts import Columns, Work, rows
+from flexik.datasets.parts import Columns, Work, Writer, stacked, table
+from flexik.learning.storage import load_restarts
 from flexik.machines.crane import Machine
 from flexik.multibody.crane.as_built import Magnitudes
 from flexik.multibody.crane.structure import FlexibleCrane
@@ -28,13 +29,20 @@ BELONGS = {"play_spread": "play"}
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What all cranes share; strokes (n, 3) in m by method at the query (n, 3)."""
+    """What all cranes share; the campaign is measured at the query (n, 3)."""
 
     crane: FlexibleCrane
-    budget: Budget
     campaign: Campaign
-    strokes: Mapping[str, Array]
     query: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Item:
+    """A crane by its number, with these kinds of deviations; strokes (n, 3) in m by method."""
+
+    number: int
+    kinds: Mapping[tuple[str, float], Magnitudes]
+    strokes: Mapping[str, Array]
 
 
 def prepare(
@@ -46,12 +54,27 @@ def prepare(
     network: Path,
     spring: Path,
     sections: object,
+    restarts: Path | None = None,
 ) -> Work:
-    """A table of BUDGET; an item is a crane with all its kinds of deviations."""
-    crane = flexible(machine, spring)
+    """A table of BUDGET, an item a crane with all its kinds of deviations.
+
+    `.restarts.parquet` is one of cranes without deviations, each compensated by the network of
+    another of the `restarts` of which `network` is the best; `twin` is the restart.
+    """
+    crane, given = flexible(machine, spring), Magnitudes(**campaign.deviations.model_dump())
     strokes, query = approaches(crane, method, read_network(network), campaign)
-    study = Study(crane, budget, campaign, strokes, query)
-    return Work(functools.partial(errors_of, study), range(budget.n_cranes), rows(*BUDGET))
+    items = [Item(k, kinds(given, budget.factor), strokes) for k in range(budget.n_cranes)]
+    others = {} if restarts is None else load_restarts(restarts)
+    perfect = {kind: sizes for kind, sizes in items[0].kinds.items() if kind[0] == "none"}
+    for number, other in others.items():
+        items.append(Item(number, perfect, approaches(crane, method, other, campaign)[0]))
+
+    def finish(results: list[Columns]) -> Mapping[str, Writer]:
+        tables = {".parquet": results[: budget.n_cranes]}
+        tables[".restarts.parquet"] = results[budget.n_cranes :]
+        return {ending: table(stacked(found, BUDGET), BUDGET) for ending, found in tables.items()}
+
+    return Work(functools.partial(errors_of, Study(crane, campaign, query)), items, finish)
 
 
 def kinds(given: Magnitudes, factor: float) -> dict[tuple[str, float], Magnitudes]:
@@ -67,19 +90,18 @@ def kinds(given: Magnitudes, factor: float) -> dict[tuple[str, float], Magnitude
     return {kind: replace(given, **changed) for kind, changed in found.items()}
 
 
-def errors_of(study: Study, number: int) -> Columns:
-    """Errors of the campaign on crane `number`, from targets and points of reference."""
-    campaign, n = study.campaign, len(study.query)
-    x, y, payload = np.tile(study.query, (len(study.strokes), 1)).T
+def errors_of(study: Study, item: Item) -> Columns:
+    """Errors of the campaign on a crane, from targets and points of reference."""
+    campaign, strokes = study.campaign, item.strokes
+    x, y, payload = np.tile(study.query, (len(strokes), 1)).T
     conditions = {"target_x": x, "target_y": y, "payload": payload}
-    method = np.repeat(list(study.strokes), n)
-    given = Magnitudes(**campaign.deviations.model_dump())
+    method = np.repeat(list(strokes), len(study.query))
     tables = []
-    for (deviation, factor), magnitudes in kinds(given, study.budget.factor).items():
-        twin, generator = twin_and_generator(study.crane, magnitudes, campaign.seed + number)
-        tips = measured_tips(twin, study.strokes, study.query[:, 2], campaign.noise, generator)
+    for (deviation, factor), magnitudes in item.kinds.items():
+        twin, generator = twin_and_generator(study.crane, magnitudes, campaign.seed + item.number)
+        tips = measured_tips(twin, strokes, study.query[:, 2], campaign.noise, generator)
         measured = dict(zip(MEASURED, np.concatenate(list(tips.values())).T, strict=True))
         errors = campaign_errors(pd.DataFrame({"method": method, **conditions, **measured}))
-        tables.append(errors.assign(deviation=deviation, factor=factor, twin=number))
-    table = pd.concat(tables)
-    return {field.name: table[field.name].to_numpy() for field in BUDGET}
+        tables.append(errors.assign(deviation=deviation, factor=factor, twin=item.number))
+    found = pd.concat(tables)
+    return {field.name: found[field.name].to_numpy() for field in BUDGET}

@@ -4,6 +4,7 @@ from typing import Any
 
 from flexik.cases.crane.parts.crane import DATA, model_inputs
 from flexik.cases.crane.parts.measured import adaptation, budget, campaign, identified
+from flexik.cases.crane.parts.methods import NETWORKS, method_settings
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part
 
@@ -16,13 +17,14 @@ def measured_parts(section: Section) -> list[Part]:
     # what stands in for a crane does not hang on whether there is one
     built = measured.campaign.model_copy(update={"file": None})
     model = model_inputs(section)
-    method, adapted = (section.methods[name] for name in measured.methods.values())
-    networks = {
-        name: DATA / f"networks/{section.methods[name].network}.json"
-        for name in reversed(measured.methods.values())
-    }
+    names = measured.methods
+    methods = {name: method_settings(section, name)["method"] for name in names.values()}
+    adapted, method = methods[names["adaptation"]], methods[names["campaign"]]
+    trained = NETWORKS / f"{method.network}.json"
+    # a genetic algorithm takes too long to be asked again with every network
+    restarts = None if method.genetic else trained.with_suffix(".restarts.json")
     compensated = {"machine": machine, "campaign": built, "method": method}
-    inputs = model | {"network": networks[measured.campaign.method]}
+    inputs = model | {"network": trained}
     made = Part("measured/campaign", campaign.prepare, compensated, inputs)
     if measured.campaign.file is not None:
         file = {"file": measured.campaign.file}
@@ -37,12 +39,15 @@ def measured_parts(section: Section) -> list[Part]:
         "machine": machine,
         "campaign": built,
         "adaptation": measured.adaptation,
-        "methods": {name: section.methods[name] for name in networks},
+        # the one that is adapted comes first
+        "methods": {name: methods[name] for name in reversed(names.values())},
     }
-    other = model | {"network": networks[measured.adaptation.method], "campaign": CAMPAIGN}
+    networks = {name: NETWORKS / f"{given.network}.json" for name, given in methods.items()}
+    other = model | {"network": networks[names["adaptation"]], "campaign": CAMPAIGN}
+    every = inputs | ({} if restarts is None else {"restarts": restarts})
     return [
         made,
-        Part("measured/budget", budget.prepare, compensated | {"budget": measured.budget}, inputs),
+        Part("measured/budget", budget.prepare, compensated | {"budget": measured.budget}, every),
         Part("measured/identified", identified.prepare, learning, other),
         Part("measured/adaptation", adaptation.prepare, judging, model | {"networks": networks}),
     ]
