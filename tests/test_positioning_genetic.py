@@ -5,12 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flexik.errors import ParameterError
 from flexik.kinematics.crane import forward
-from flexik.positioning.crane import genetic as module
-from flexik.positioning.crane.genetic import GeneticSettings, first_generation, genetic
-from flexik.positioning.crane.initial import initial_positions
-from flexik.positioning.method import NOT_CONVERGED, REACHED
+from flexik.kinematics.crane_manipulator import CraneManipulator
+from flexik.kinematics.status import NOT_CONVERGED, REACHED
+from flexik.positioning import genetic as module
+from flexik.positioning.genetic import Genetic, GeneticManipulator, first_generation
 
 
 def distance(geometry, strokes, targets):
@@ -19,8 +18,10 @@ def distance(geometry, strokes, targets):
 
 @pytest.fixture(scope="module")
 def solved(geometry, points):
-    current = initial_positions(geometry, points)
-    return current, genetic(geometry, GeneticSettings(seed=3))(points, current)
+    current = CraneManipulator(geometry).initial_positions(points)
+    return current, GeneticManipulator(CraneManipulator(geometry), Genetic(seed=3)).inverse(
+        points, current
+    )
 
 
 def test_reaches_the_test_points(geometry, points, solved):
@@ -39,8 +40,10 @@ def test_rows_do_not_depend_on_order_grouping_or_numpys_global_state(geometry, p
     rows = np.array([7, 2, 7, 20])
     np.random.seed(1)  # noqa: NPY002
     before = np.random.get_state()[1].copy()  # noqa: NPY002
-    again = genetic(geometry, GeneticSettings(seed=3))(points[rows], current[rows])
-    assert np.array_equal(again.strokes, strokes[rows])
+    again = GeneticManipulator(CraneManipulator(geometry), Genetic(seed=3)).inverse(
+        points[rows], current[rows]
+    )
+    assert np.array_equal(again.values, strokes[rows])
     generations = diagnostics["n_generations"]
     assert np.array_equal(again.diagnostics["n_generations"], generations[rows])
     assert np.array_equal(np.random.get_state()[1], before)  # noqa: NPY002
@@ -48,8 +51,10 @@ def test_rows_do_not_depend_on_order_grouping_or_numpys_global_state(geometry, p
 
 def test_another_seed_gives_another_search(geometry, points, solved):
     current, (strokes, _, _) = solved
-    other = genetic(geometry, GeneticSettings(seed=4))(points[:3], current[:3])
-    assert (other.strokes != strokes[:3]).any(axis=1).all()
+    other = GeneticManipulator(CraneManipulator(geometry), Genetic(seed=4)).inverse(
+        points[:3], current[:3]
+    )
+    assert (other.values != strokes[:3]).any(axis=1).all()
 
 
 def test_first_generation_holds_the_current_strokes_twice(geometry, points, monkeypatch):
@@ -62,8 +67,10 @@ def test_first_generation_holds_the_current_strokes_twice(geometry, points, monk
             super()._evaluate(x, out, *args, **kwargs)
 
     monkeypatch.setattr(module, "_Distance", Spy)
-    chosen = GeneticSettings(n_generations=4, tolerance=1e-9)
-    genetic(geometry, chosen)(points[:2], np.tile(current, (2, 1)))
+    chosen = Genetic(n_generations=4, tolerance=1e-9)
+    GeneticManipulator(CraneManipulator(geometry), chosen).inverse(
+        points[:2], np.tile(current, (2, 1))
+    )
     assert [x.shape for x in seen] == [(15, 3)] * 8  # a whole generation at once
     assert (seen[0] != seen[4]).all(axis=1).sum() == 13  # each row has its own random numbers
     assert (seen[0] == current).all(axis=1).sum() == 2
@@ -79,8 +86,10 @@ def test_first_generation_holds_the_current_strokes_twice(geometry, points, monk
     n_current=st.integers(0, 2),
 )
 def test_first_generation_lies_within_the_strokes(geometry, current, n, n_current):
-    chosen = GeneticSettings(n_individuals=n, n_current=n_current)
-    population = first_generation(geometry, chosen, current, np.random.default_rng(0))
+    chosen = Genetic(n_individuals=n, n_current=n_current)
+    population = first_generation(
+        CraneManipulator(geometry), chosen, current, np.random.default_rng(0)
+    )
     assert population.shape == (n, 3)
     assert (population >= 0).all() and (population <= geometry.stroke_maximum).all()
     clipped = np.clip(current, 0.0, geometry.stroke_maximum)
@@ -92,7 +101,9 @@ def test_first_generation_lies_within_the_strokes(geometry, current, n, n_curren
 def test_current_strokes_on_the_target_are_kept(geometry, fraction):
     current = (fraction * geometry.stroke_maximum)[None]
     target = forward(geometry, current) + 3e-3
-    strokes, status, diagnostics = genetic(geometry, GeneticSettings())(target, current)
+    strokes, status, diagnostics = GeneticManipulator(
+        CraneManipulator(geometry), Genetic()
+    ).inverse(target, current)
     assert status[0] == REACHED
     assert diagnostics["n_generations"][0] == 1
     assert distance(geometry, strokes, target)[0] < 5e-3
@@ -100,8 +111,10 @@ def test_current_strokes_on_the_target_are_kept(geometry, fraction):
 
 def test_unreachable_target_is_counted_and_stays(geometry):
     current = np.array([[0.1, 0.2, 0.3]])
-    chosen = GeneticSettings(n_generations=5)
-    strokes, status, diagnostics = genetic(geometry, chosen)(np.array([[9.0, 9.0]]), current)
+    chosen = Genetic(n_generations=5)
+    strokes, status, diagnostics = GeneticManipulator(CraneManipulator(geometry), chosen).inverse(
+        np.array([[9.0, 9.0]]), current
+    )
     assert status.tolist() == [NOT_CONVERGED]
     assert np.array_equal(strokes, current)
     assert diagnostics["n_generations"].tolist() == [5]
@@ -109,7 +122,9 @@ def test_unreachable_target_is_counted_and_stays(geometry):
 
 
 def test_no_rows(geometry):
-    strokes, status, _ = genetic(geometry, GeneticSettings())(np.empty((0, 2)), np.empty((0, 3)))
+    strokes, status, _ = GeneticManipulator(CraneManipulator(geometry), Genetic()).inverse(
+        np.empty((0, 2)), np.empty((0, 3))
+    )
     assert strokes.shape == (0, 3) and status.shape == (0,)
 
 
@@ -124,5 +139,5 @@ def test_no_rows(geometry):
     ],
 )
 def test_settings_are_checked(wrong):
-    with pytest.raises(ParameterError, match=next(iter(wrong))):
-        GeneticSettings(**wrong)
+    with pytest.raises(ValueError, match=next(iter(wrong))):
+        Genetic(**wrong)

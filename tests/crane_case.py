@@ -1,0 +1,29 @@
+"""The crane as the project describes it, on a spring of its own."""
+
+import contextlib
+import functools
+from pathlib import Path
+
+from flexik.cases.case import load
+from flexik.kinematics.crane_manipulator import CraneManipulator, geometry_of
+from flexik.multibody.crane.assembly import flexible_crane
+
+ROOT = Path(__file__).parents[1]
+SPRING = 8e6  # N m/rad
+
+
+@functools.cache
+def section():
+    """Section `crane` of params.yaml."""
+    with contextlib.chdir(ROOT):
+        return load("crane")
+
+
+@functools.cache
+def crane(stiffness=SPRING):
+    """The flexible crane."""
+    with contextlib.chdir(ROOT):  # sections are named relative to the project
+        return flexible_crane(section().machine, stiffness)
+
+
+MANIPULATOR = CraneManipulator(geometry_of(section().machine))
