@@ -12,232 +12,175 @@ from flexik.cases.elastic_arm.parts.gauges import FREE_OF_NOISE, NOISY
 from flexik.cases.elastic_arm.parts.kinds import KINDS
 from flexik.cases.elastic_arm.parts.readings import ANGLES, TRAINING
 from flexik.cases.elastic_arm.report_figures import figures, shown_networks
-from flexik.cases.elastic_arm.report_results import DATA, NEAR, PUBLISHED, R, Results, read
+from flexik.cases.elastic_arm.report_results import DATA, NEAR, PUBLISHED, R, Results, chosen, of
 from flexik.cases.elastic_arm.section import Section
-from flexik.evaluation.errors import workspace_statistics
+from flexik.files import read_json
 from flexik.kinematics.elastic_arm import DEFORMATION
+from flexik.learning.size_selection import by_size
 from flexik.reporting.report import Content, made_from, write_report
 from flexik.reporting.style import MICRO, MM
 from flexik.reporting.tables import Column, Table, mm, table
 
 REPORT = Path("reports/elastic_arm")
-# Statistics of random targets that are metrics
-STATISTICS = ("mean_error", "median_error", "p95_error", "max_error")
 NOTHING = "nothing"
-EXTRA = {"gauges_without_dx": ", without dx", "gauges_elbow": ", and elbow"}
 
 
 def report(section: Section) -> None:
     """Write reports/elastic_arm from data/elastic_arm."""
-    results = read(section)
-    write_report(
-        REPORT,
-        Path(__file__).with_name("page.md.j2"),
-        Content(
-            tables=tables(results),
-            figures=figures(results),
-            metrics=metrics(results),
-            values=values(results),
-        ),
-        sources=made_from(section, [PUBLISHED]),
-        record=DATA / "report.json",
-    )
+    results = Results(section)
+    content = Content(tables(results), figures(results), metrics(results), values(results))
+    sources, record = made_from(section, [PUBLISHED]), DATA / "report.json"
+    template = Path(__file__).with_name("page.md.j2")
+    write_report(REPORT, template, content, sources=sources, record=record)
 
 
 def metrics(results: Results) -> dict[str, float | None]:
     """Flat; lengths in mm, rounded to what machines agree on."""
     found: dict[str, float | None] = {}
     for name, fit in results.fits.iterrows():
-        for k, (r, at_targets) in enumerate(zip(R, results.target_r(str(name)), strict=True), 1):
-            found[f"{name}.r_theta{k}"] = round(fit[r], 6)
-            found[f"{name}.training_r_theta{k}"] = round(fit[f"training_{r}"], 6)
-            if np.isfinite(at_targets):
-                found[f"{name}.targets_r_theta{k}"] = round(at_targets, 6)
-        for which in ("mean", "max"):
-            found[f"{name}.held_out_{which}_error_mm"] = round(MM * fit[f"{which}_error"], 4)
-    for label, frame in results.errors.items():
-        statistics = workspace_statistics(frame)
-        found |= {f"{label}.{s}_mm": round(MM * statistics[s], 4) for s in STATISTICS}
-        found[f"{label}.n_failed"] = int(statistics["n_failed"])
-    for label, restarts in results.restarts.items():
+        for k, r in enumerate(R, start=1):
+            for which in ("", "training_", "targets_"):
+                if np.isfinite(fit[f"{which}{r}"]):
+                    found[f"{name}.{which}r_theta{k}"] = round(fit[f"{which}{r}"], 6)
         for which in ("mean_error", "max_error"):
-            found[f"{label}.worst_restart_{which}_mm"] = round(MM * restarts[which].max(), 4)
-    for _, told in chosen(results.payload_error).iterrows():
-        found[f"{told['method']}.payload_off_mean_error_mm"] = round(MM * told["mean_error"], 4)
-    off = sensitivity_of(results, results.main)
-    for changed, error in off.drop(NOTHING).items():
+            found[f"{name}.held_out_{which}_mm"] = round(MM * fit[which], 4)
+    names = ["mean_error", "median_error", "p95_error", "max_error"]
+    names += ["worst_mean_error", "worst_max_error", "told"]
+    for label, row in results.positioning.iterrows():
+        for which in names:
+            if np.isfinite(row[which]):
+                title = {"told": "payload_off_mean_error"}.get(which, which)
+                found[f"{label}.{title}_mm"] = round(MM * row[which], 4)
+        found[f"{label}.n_failed"] = int(row["n_failed"])
+    for changed, error in sensitivity(results.main).drop(NOTHING).items():
         found[f"{results.main}.{changed}_off_mean_error_mm"] = round(MM * error, 4)
-    splits = results.all_splits()
     for k, r in enumerate(R, start=1):
-        found[f"splits.median_r_theta{k}"] = round(splits[r].median(), 6)
-        found[f"splits.least_r_theta{k}"] = round(splits[r].min(), 6)
-    for name, study in results.studies.items():
-        found |= {f"select.{name}.n_hidden_{k}": n for k, n in enumerate(study.chosen, start=1)}
-    parts = results.readings["part"].value_counts().sort_index()
+        found[f"splits.median_r_theta{k}"] = round(results.splits[r].median(), 6)
+        found[f"splits.least_r_theta{k}"] = round(results.splits[r].min(), 6)
+    for name in selected(results):
+        for k, n in enumerate(results.layers(name), start=1):
+            found[f"select.{name}.n_hidden_{k}"] = n
+    parts = of("samples/readings")["part"].value_counts().sort_index()
     return found | {f"readings.n_{part}": int(n) for part, n in parts.items()}
 
 
 def tables(results: Results) -> dict[str, Table]:
     """All tables by name."""
-    training = results.training.copy()
-    training.insert(1, "hidden", [results.hidden(name) for name in training["network"]])
+    fits = results.fits.reset_index()
+    r_columns = {
+        f"R {angle}, {title}": Column(f"{which}{r}", 6 if title == "published" else 8)
+        for which, title in (
+            *(("training_", "training"), ("", "held out")),
+            *(("targets_", "targets"), ("published_", "published")),
+        )
+        for angle, r in zip(ANGLES, R, strict=True)
+    }
+    training = pd.concat(
+        [
+            pd.read_csv(DATA / f"networks/{name}.restarts.csv").assign(
+                network=name, hidden=results.hidden(name)
+            )
+            for name in results.section.networks
+        ]
+    )
+    front = ["network", "hidden", "restart"]
+    training = training[[*front, *(name for name in training if name not in front)]]
     return {
-        "sensitivity": sensitivity_table(results),
+        "sensitivity": sensitivity_table(),
         "positioning_errors": positioning_table(results),
-        "fit": fit_table(results),
+        "fit": table(
+            fits,
+            {
+                **{name: name for name in ("network", "hidden", "trainer", "gauges")},
+                **r_columns,
+                "mean tip error (mm)": mm("mean_error"),
+                "max tip error (mm)": mm("max_error"),
+                "mean tip error by restart (mm)": "mean_errors",
+            },
+        ),
         "splits": splits_table(results),
         "gauges": gauges_table(results),
         "training": Table(training, {"training_error": 6, "selection_error": 6}),
-        **{f"size_selection/{name}": size_table(results, name) for name in results.studies},
+        **{f"size_selection/{name}": size_table(name) for name in selected(results)},
     }
-
-
-def chosen(frame: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the restarts that were chosen."""
-    return frame[frame["chosen"] == 1]
-
-
-def by_restart(values: pd.Series, decimals: int) -> str:
-    """Millimetres of the restarts of a network, in their order."""
-    return ", ".join(f"{MM * value:.{decimals}f}" for value in values)
-
-
-def fit_table(results: Results) -> Table:
-    """Networks given gauges: R and tip errors (mm) on training and held-out readings."""
-    rows = []
-    for name, fit in results.fits.iterrows():
-        network = results.section.networks[str(name)]
-        restarts = results.fit_restarts[results.fit_restarts["network"] == name]
-        row = {
-            "network": name,
-            "hidden": results.hidden(str(name)),
-            "trainer": network.trainer,
-            "gauges": network.readings.replace("_", "-") + EXTRA.get(str(network.learns), ""),
-        }
-        for of, r in (
-            ("training", fit[[f"training_{r}" for r in R]].to_numpy()),
-            ("held out", fit[R].to_numpy()),
-            ("targets", results.target_r(str(name))),
-            ("published", results.published_r(str(name))),
-        ):
-            row |= {f"R {a}, {of}": value for a, value in zip(ANGLES, r, strict=True)}
-        row["mean tip error (mm)"] = MM * fit["mean_error"]
-        row["max tip error (mm)"] = MM * fit["max_error"]
-        row["mean tip error by restart (mm)"] = by_restart(restarts["mean_error"], 2)
-        rows.append(row)
-    frame = pd.DataFrame(rows)
-    r_columns = [name for name in frame if name.startswith("R ")]
-    return Table(frame, {name: 6 if "published" in name else 8 for name in r_columns})
-
-
-def splits_table(results: Results) -> Table:
-    """R of one network on the held-out readings of every division."""
-    frame = results.all_splits()
-    rows = [
-        ("main" if k == 0 else "other", str(int(row["seed"])), *(row[r] for r in R))
-        for k, row in enumerate(frame.to_dict("records"))
-    ]
-    of_all = frame[R]
-    rows += [
-        (name, "", *found)
-        for name, found in (
-            ("median", of_all.median()),
-            ("largest - least", of_all.max() - of_all.min()),
-            ("published", results.published_r(results.main)),
-        )
-    ]
-    return Table(pd.DataFrame(rows, columns=["division", "seed", "R theta_1", "R theta_2"]), 6)
-
-
-def sensitivity_of(results: Results, name: str) -> pd.Series:
-    """Mean tip error in m of a network by the input that is off."""
-    rows = chosen(results.sensitivity)
-    return rows[rows["network"] == name].set_index("input")["mean_error"]
-
-
-def sensitivity_table(results: Results) -> Table:
-    """Mean tip errors in mm by input and network, and by how much the input is off."""
-    rows = chosen(results.sensitivity)
-    off = rows.groupby("input", sort=False)["change"].first()
-    frame = pd.DataFrame({"off by (um, urad)": MICRO * off})
-    for name in dict.fromkeys(rows["network"]):
-        frame[name] = MM * sensitivity_of(results, name)
-    return Table(frame.rename_axis("input that is off").reset_index(), 3)
-
-
-def knows(learns: str) -> str:
-    """What a method knows, by what its network learnt."""
-    pose = " in the pose to be found"
-    return {
-        "gauges": f"target, gauges{pose}",
-        "gauges_without_dx": f"target, gauges but dx{pose}",
-        "gauges_elbow": f"target, elbow, gauges{pose}",
-        "coordinates": "target, payload, elbow",
-    }.get(learns, "target, payload")
 
 
 def positioning_table(results: Results) -> Table:
     """Errors of the methods at the random targets, mm."""
-    rows = []
-    for label, frame in results.errors.items():
-        method = results.section.methods[label]
-        network = results.section.networks[method.network] if method.network else None
-        told = network.readings.replace("_", "-") if network and network.has_gauges else ""
-        row = {
-            "method": label,
-            "knows": knows(str(network.learns)) if network else "target",
-            "gauges": told,
-            "hidden": results.hidden(method.network) if method.network else "",
-            "trainer": network.trainer if network else "",
-            **workspace_statistics(frame),
-            "clipped": int((frame["n_clipped"] > 0).sum()),
-        }
-        for which in ("mean_error", "max_error"):
-            spread = results.restarts.get(label)
-            row[f"{which}s"] = "" if spread is None else by_restart(spread[which], 3)
-        rows.append(row)
     texts = ("method", "knows", "gauges", "hidden", "trainer")
     return table(
-        rows,
+        results.positioning.rename_axis("method").reset_index(),
         {
             **{name: name for name in texts},
             "mean (mm)": mm("mean_error", 3),
             "median (mm)": mm("median_error", 3),
             "95 % (mm)": mm("p95_error", 3),
             "max (mm)": mm("max_error", 3),
-            "failed": Column("n_failed"),
-            "clipped": Column("clipped"),
+            "failed": "n_failed",
+            "clipped": "clipped",
             "mean by restart (mm)": "mean_errors",
             "max by restart (mm)": "max_errors",
         },
     )
 
 
+def splits_table(results: Results) -> Table:
+    """R of one network on the held-out readings of every division."""
+    splits = results.splits
+    rows = splits.assign(seed=splits["seed"].astype(str), division="other")
+    rows.loc[0, "division"] = "main"
+    below = pd.DataFrame(
+        [splits[R].median(), splits[R].max() - splits[R].min()],
+        index=["median", "largest - least"],
+    )
+    below.loc["published"] = results.fits.loc[
+        results.main, [f"published_{r}" for r in R]
+    ].to_numpy()
+    rows = pd.concat([rows, below.rename_axis("division").reset_index().assign(seed="")])
+    titles = {f"R {angle}": Column(r, 6) for angle, r in zip(ANGLES, R, strict=True)}
+    return table(rows, {"division": "division", "seed": "seed", **titles})
+
+
+def sensitivity(name: str) -> pd.Series:
+    """Mean tip error in m of a network by the input that is off."""
+    rows = chosen(of("studies/sensitivity"))
+    return rows[rows["network"] == name].set_index("input")["mean_error"]
+
+
+def sensitivity_table() -> Table:
+    """Mean tip errors in mm by input and network, and by how much the input is off."""
+    rows = chosen(of("studies/sensitivity"))
+    off = rows.groupby("input", sort=False)["change"].first()
+    by_network = {name: MM * sensitivity(name) for name in dict.fromkeys(rows["network"])}
+    frame = pd.DataFrame({"off by (um, urad)": MICRO * off, **by_network}).loc[off.index]
+    return Table(frame.rename_axis("input that is off").reset_index(), 3)
+
+
 def gauges_table(results: Results) -> Table:
     """Deformation by the gauges minus that of the model, over all readings, mm and mrad."""
+    names = list(DEFORMATION)
+    model = of("samples/readings")[names]
+    frame = pd.DataFrame({"variable": names}, index=names)
+    frame["unit"] = ["mrad" if name.startswith("dphi") else "mm" for name in names]
+    frame["largest, model"] = MM * model.abs().max()
+    frame["largest, gauges"] = MM * results.shown(FREE_OF_NOISE)[names].abs().max()
     uncertain = gauges.uncertainty(gauges.gauges_of(results.section.machine))
-    rows = []
-    for name, spread in zip(DEFORMATION, uncertain, strict=True):
-        model = MM * results.readings[name].to_numpy()
-        row: dict[str, Any] = {
-            "variable": name,
-            "unit": "mrad" if name.startswith("dphi") else "mm",
-            "largest, model": np.abs(model).max(),
-            "largest, gauges": np.abs(MM * results.shown[FREE_OF_NOISE][name]).max(),
-            "standard uncertainty, noisy": MM * spread,
-        }
-        for shown in (FREE_OF_NOISE, NOISY):
-            difference = np.abs(MM * results.shown[shown][name].to_numpy() - model)
-            row[f"mean difference, {shown.replace('_', '-')}"] = difference.mean()
-            row[f"max difference, {shown.replace('_', '-')}"] = difference.max()
-        rows.append(row)
-    frame = pd.DataFrame(rows)
+    frame["standard uncertainty, noisy"] = MM * uncertain
+    for noise in (FREE_OF_NOISE, NOISY):
+        difference = MM * (results.shown(noise)[names] - model).abs()
+        frame[f"mean difference, {noise.replace('_', '-')}"] = difference.mean()
+        frame[f"max difference, {noise.replace('_', '-')}"] = difference.max()
     return Table(frame, dict.fromkeys(frame.columns[2:], 5))
 
 
-def size_table(results: Results, name: str) -> Table:
+def selected(results: Results) -> list[str]:
+    """Networks whose size was chosen."""
+    return [name for name, network in results.section.networks.items() if network.is_selected]
+
+
+def size_table(name: str) -> Table:
     """Errors of every size of a study."""
-    sizes = results.studies[name].sizes
+    sizes = by_size(of(f"sizes/{name}"))
     counts = [c for c in sizes if str(c).startswith(("n_", "best_"))]
     errors = [c for c in sizes if str(c).endswith("_error")]
     return Table(sizes.astype(dict.fromkeys(counts, int)), dict.fromkeys(errors, 6))
@@ -245,162 +188,94 @@ def size_table(results: Results, name: str) -> Table:
 
 def values(results: Results) -> dict[str, Any]:
     """What the sentences of the page hold."""
-    section, exact = results.section, results.shown[FREE_OF_NOISE]
-    voltages = exact[[f.name for f in gauges.FIELDS if f.name.startswith("voltage")]].to_numpy()
+    section, exact, readings = results.section, results.shown(FREE_OF_NOISE), of("samples/readings")
+    voltages = exact.filter(like="voltage").to_numpy()
+    tip = readings[["tip_x", "tip_y"]].to_numpy()
+    used = {network.trainer for network in section.networks.values()}
     return {
+        "results": results,
         "section": section,
         "given": section.machine.gauges,
-        "counts": results.counts,
-        "conditions": next(iter(section.conditions.values())),
-        "n_of_part": results.readings["part"].value_counts().to_dict(),
-        "border": results.on_border(),
         "main": results.main,
-        "largest_dx": [exact[f"dx_{link}"].abs().max() for link in (1, 2)],
-        "largest_strain": [exact[f"strain_{link}"].abs().max() for link in (1, 2)],
-        "largest_dy": results.readings[["dy_1", "dy_2"]].abs().to_numpy().max(),
+        "counts": read_json(DATA / f"samples/{results.conditions}.json"),
+        "n_of_part": readings["part"].value_counts().to_dict(),
+        "dx": [exact[f"dx_{link}"].abs().max() for link in (1, 2)],
+        "strain": [exact[f"strain_{link}"].abs().max() for link in (1, 2)],
+        "largest_dy": readings[["dy_1", "dy_2"]].abs().to_numpy().max(),
         "voltages": [voltages.min(), voltages.max()],
         "n_clipped": gauges.n_clipped(gauges.gauges_of(section.machine), voltages),
         "gauge_tip": {
-            shown.replace("_", "-"): results.gauge_difference(shown)
-            for shown in (FREE_OF_NOISE, NOISY)
+            noise.replace("_", "-"): np.hypot(
+                *(results.shown(noise)[["p_x", "p_y"]].to_numpy() - tip).T
+            )
+            for noise in (FREE_OF_NOISE, NOISY)
         },
         "fits": results.fits.to_dict("index"),
-        "hidden": {name: results.hidden(name) for name in section.networks},
-        "like": alike(results, ("trainer",)),
+        "positioning": results.positioning.to_dict("index"),
         "near": NEAR,
-        "shown_networks": shown_networks(results),
-        "trainers": {
-            name: trainer
-            for name, trainer in section.trainers.items()
-            if any(network.trainer == name for network in section.networks.values())
-        },
-        "sizes": {name: size_values(results, name) for name in results.studies},
+        "published_networks": shown_networks(results),
+        "trainers": {name: t for name, t in section.trainers.items() if name in used},
+        "sizes": {name: size_values(results, name) for name in selected(results)},
+        "depths": depths(results),
+        "splits": results.splits,
         **sensitivity_values(results),
-        **published_values(results),
-        **positioning_values(results),
     }
 
 
-def alike(results: Results, keys: tuple[str, ...]) -> list[str]:
-    """Networks given gauges of the layers and the settings `keys` of the published one."""
+def alike(results: Results, *keys: str) -> list[str]:
+    """Networks given gauges whose settings `keys` are those of the published one."""
     like = results.section.networks[results.main]
     return [
         name
         for name, network in results.section.gauge_networks.items()
-        if results.layers[name] == results.layers[results.main]
-        and all(getattr(network, key) == getattr(like, key) for key in keys)
+        if all(getattr(network, key) == getattr(like, key) for key in keys)
     ]
 
 
 def sensitivity_values(results: Results) -> dict[str, Any]:
     """The input that the published network depends on most, and which noise costs it more."""
-    off = sensitivity_of(results, results.main)
+    off, rows = sensitivity(results.main), of("studies/sensitivity")
     worst = str(off.drop(NOTHING).idxmax())
-    rows = results.sensitivity
     rows = rows[(rows["network"] == results.main) & (rows["input"] == worst)]
+    same = alike(results, "trainer", "n_hidden", "learns")
     by_noise = {
         results.section.networks[name].readings: results.fits.loc[name, "mean_error"]
-        for name in reversed(alike(results, ("trainer", "learns")))
+        for name in reversed(same)
     }
-    costs = None
-    if set(by_noise) == set(gauges.SHOWN):
-        free, noisy, voltages = (by_noise[shown] for shown in gauges.SHOWN)
-        costs = {"voltages": voltages - free, "strains": noisy - voltages}
+    free, noisy, voltages = (by_noise.get(noise, np.nan) for noise in gauges.SHOWN)
     return {
-        "worst_input": worst,
+        "off": off.to_dict(),
+        "worst": worst,
         "worst_change": rows["change"].iloc[0],
         "worst_errors": rows["mean_error"].tolist(),
-        "off": off.to_dict(),
-        "noise_costs": costs,
+        "alike": alike(results, "trainer", "n_hidden"),
+        "noise_costs": {"voltages": voltages - free, "strains": noisy - voltages},
     }
 
 
-def published_values(results: Results) -> dict[str, Any]:
-    """Ours beside the published R: in the main division, all divisions, one and several layers."""
-    published = {
-        str(name): {
-            "published": results.published_r(str(name)),
-            "targets": results.target_r(str(name)),
-            "restarts": results.fit_restarts.loc[results.fit_restarts["network"] == name, R],
-        }
-        for name in results.published.index.intersection(results.fits.index)
-    }
-    splits = results.all_splits()
-    divisions = [
-        {
-            "angle": angle,
-            "published": theirs,
-            "main": splits[r].iloc[0],
-            "median": splits[r].median(),
-            "n_reached": int((splits[r] >= theirs).sum()),
-            "n": len(splits),
-        }
-        for angle, r, theirs in zip(ANGLES, R, results.published_r(results.main), strict=True)
-        if np.isfinite(theirs)
-    ]
-    like = results.section.networks[results.main]
-    depths: dict[str, pd.DataFrame] = {}
-    for name, network in results.section.gauge_networks.items():
-        if all(getattr(network, k) == getattr(like, k) for k in ("learns", "readings", "trainer")):
-            depth = "several" if len(results.layers[name]) > 1 else "one layer"
-            depths[depth] = pd.concat([depths.get(depth), results.fits.loc[[name]]])
+def depths(results: Results) -> dict[str, Any]:
+    """Best networks of one and of several layers by the published trainer and inputs."""
+    rows = results.fits.loc[alike(results, "learns", "readings", "trainer")]
+    rows = rows.assign(lesser=rows[R].min(axis=1))
+    deep = rows["hidden"].str.contains("-")
     return {
-        "published": published,
-        "divisions": divisions,
-        "depths": {
-            depth: {
-                "by_r": (rows[R].min(axis=1).idxmax(), rows[R].min(axis=1).max()),
-                "by_tip": (rows["mean_error"].idxmin(), rows["mean_error"].min()),
-            }
-            for depth, rows in sorted(depths.items())
-        },
-    }
-
-
-def positioning_values(results: Results) -> dict[str, Any]:
-    """What the methods owe to, and lose by, the readings they learnt from."""
-    near = {}
-    for label, method in results.section.methods.items():
-        frame = results.errors[label]
-        rows = results.near_payloads(frame)
-        if method.method == "gauges" and rows.any() and not rows.all():
-            error = frame["error"]
-            near[label] = {
-                "held_out": results.fits.loc[method.network, "mean_error"],
-                "n": int(rows.sum()),
-                "near": error[rows].mean(),
-                "far": error[~rows].mean(),
-            }
-    (none,) = (label for label, m in results.section.methods.items() if m.method == "none")
-    uncompensated = results.errors[none]["error"]
-    told = chosen(results.payload_error).set_index("method")["mean_error"]
-    return {
-        "near_payloads": near,
-        "told": {
-            label: {"wrong": wrong, "right": results.errors[str(label)]["error"].mean()}
-            for label, wrong in told.items()
-        },
-        "any_clipped": any((frame["n_clipped"] > 0).any() for frame in results.errors.values()),
-        "n_worse": {
-            label: int((frame["error"] > uncompensated).sum())
-            for label, frame in results.errors.items()
-        },
+        title: {"by_r": of_depth["lesser"].idxmax(), "by_tip": of_depth["mean_error"].idxmin()}
+        for title, of_depth in (("one layer", rows[~deep]), ("several", rows[deep]))
+        if len(of_depth)
     }
 
 
 def size_values(results: Results, name: str) -> dict[str, Any]:
     """Whether the choice is on the border, and how near to more weights than numbers."""
-    study, kind = results.studies[name], KINDS[str(results.section.networks[name].learns)]
-    layers = (len(kind.inputs), *study.chosen, len(kind.outputs))
-    sizes = study.sizes.filter(like="n_hidden").max().tolist()
+    runs, kind = of(f"sizes/{name}"), KINDS[str(results.section.networks[name].learns)]
+    sizes, tried = results.layers(name), runs.filter(like="n_hidden").max()
+    pairs = itertools.pairwise((len(kind.inputs), *sizes, len(kind.outputs)))
+    n_training = int((of("samples/readings")["part"] == TRAINING).sum())
     return {
-        "chosen": results.hidden(name),
         "select": results.section.networks[name].select,
-        "n_goal": study.n_goal,
-        "n_runs": study.n_runs,
-        "largest": [
-            k for k, (n, m) in enumerate(zip(study.chosen, sizes, strict=True), 1) if n == m
-        ],
-        "n_weights": sum((a + 1) * b for a, b in itertools.pairwise(layers)),
-        "n_numbers": int((results.readings["part"] == TRAINING).sum()) * len(kind.outputs),
+        "n_goal": int((runs["stop_reason"] == "goal").sum()),
+        "n_runs": len(runs),
+        "largest": [k for k, (n, m) in enumerate(zip(sizes, tried, strict=True), 1) if n == m],
+        "n_weights": sum((a + 1) * b for a, b in pairs),
+        "n_numbers": n_training * len(kind.outputs),
     }

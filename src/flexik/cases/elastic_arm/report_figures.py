@@ -1,13 +1,11 @@
 """Figures of the elastic arm: frames for the kinds of figures of the kit."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pandas as pd
 
 from flexik.cases.elastic_arm.parts.gauges import FREE_OF_NOISE, NOISY
 from flexik.cases.elastic_arm.parts.readings import ANGLES, HELD_OUT
-from flexik.cases.elastic_arm.report_results import R, Results
+from flexik.cases.elastic_arm.report_results import R, Results, of
 from flexik.evaluation.regression import correlation
 from flexik.reporting import kinds, plane, style
 from flexik.reporting.chart import Axis, Layer, chart
@@ -59,8 +57,8 @@ def figures(results: Results) -> dict[str, Drawing]:
 
 def shown_networks(results: Results) -> list[str]:
     """Networks whose values are published, or the first one."""
-    names = list(results.section.gauge_networks)
-    return [name for name in results.published.index if name in names] or names[:1]
+    published = results.fits[f"published_{R[0]}"].notna()
+    return [str(name) for name in results.fits.index[published]] or [results.main]
 
 
 def hidden_methods(results: Results) -> list[str]:
@@ -78,9 +76,10 @@ def deformation(results: Results, link: int) -> Drawing:
     without noise.
     """
     # at 0 no force acts along link 1
-    rows = np.isclose(results.readings["theta_1"], results.readings["theta_1"].max())
-    readings = results.readings[rows]
-    exact, noisy = (results.shown[shown][rows] for shown in (FREE_OF_NOISE, NOISY))
+    readings = of("samples/readings")
+    rows = np.isclose(readings["theta_1"], readings["theta_1"].max())
+    readings = readings[rows]
+    exact, noisy = (results.shown(noise)[rows] for noise in (FREE_OF_NOISE, NOISY))
     dx, dy, dphi = (f"{name}_{link}" for name in ("dx", "dy", "dphi"))
     panels = {
         "dx of the model": (Axis("dx (mm)", MM), readings[dx], None),
@@ -89,13 +88,15 @@ def deformation(results: Results, link: int) -> Drawing:
         "dphi": (Axis("dphi (mrad)", MM), readings[dphi], noisy[dphi]),
     }
 
-    def stacked(which: int) -> Iterator[pd.DataFrame]:
-        for panel, of_panel in panels.items():
-            if (values := of_panel[which]) is not None:
-                pose = readings[["theta_2", "payload"]]
-                yield pose.assign(value=values, panel=panel)
-
-    lines, dots = (pd.concat(stacked(which)) for which in (1, 2))
+    pose = readings[["theta_2", "payload"]]
+    lines, dots = (
+        pd.concat(
+            pose.assign(value=of_panel[which], panel=panel)
+            for panel, of_panel in panels.items()
+            if of_panel[which] is not None
+        )
+        for which in (1, 2)
+    )
     return draw(
         chart,
         Layer(lines, "theta_2", "value", "-", "payload", label="{:g} kg"),
@@ -113,14 +114,14 @@ def deformation(results: Results, link: int) -> Drawing:
 def target_and_network(results: Results, name: str) -> Drawing:
     """Angles and tip by a network against their targets (after figures 15 to 18 of the paper)."""
     table = results.joined(name)
-    published = dict(zip(ANGLES, results.published_r(name), strict=True))
+    published = results.fits.loc[name, [f"published_{r}" for r in R]].set_axis(ANGLES)
     held_out = table["part"] == HELD_OUT
     frames, titles = [], {}
     for quantity in PAIRS:
         pair = table[[quantity, f"network_{quantity}"]]
         frames.append(pair.set_axis(["target", "network"], axis=1).assign(quantity=quantity))
         r = correlation(*(pair[held_out].to_numpy()[:, [k]] for k in (0, 1)))[0]
-        titles[quantity] = f"{quantity}, held-out R = {r:.6f}"
+        titles[quantity] = f"{quantity}: R = {r:.6f}"
         if np.isfinite(published.get(quantity, np.nan)):
             titles[quantity] += f" (published {published[quantity]:.6f})"
     every = pd.concat(frames).reset_index(drop=True)
@@ -153,23 +154,25 @@ def target_and_network(results: Results, name: str) -> Drawing:
 
 def network_comparison(results: Results) -> Drawing:
     """One minus R of both angles on held-out readings by network (after figures 19 to 22)."""
+    fits = results.fits
     rows = [
-        {
-            "network": f"{name} ({results.hidden(name)})",
-            "angle": angle,
-            "ours": max(1.0 - fit[r], ROUND_OFF),
-            "published": 1.0 - results.published_r(str(name))[k],
-        }
-        for name, fit in results.fits.iterrows()
-        for k, (angle, r) in enumerate(zip(ANGLES, R, strict=True))
+        pd.DataFrame(
+            {
+                "network": [f"{name} ({hidden})" for name, hidden in fits["hidden"].items()],
+                "angle": angle,
+                "ours": 1.0 - fits[r],
+                "published": 1.0 - fits[f"published_{r}"],
+            }
+        )
+        for angle, r in zip(ANGLES, R, strict=True)
     ]
     return draw(
         kinds.beside,
-        pd.DataFrame(rows),
+        pd.concat(rows),
         "network",
         "ours",
         "published",
-        Axis("1 \N{MINUS SIGN} R on held-out readings (less is better)", log=True),
+        Axis("1 \N{MINUS SIGN} R on held-out readings (less is better)", log=True, least=ROUND_OFF),
         hue="angle",
         numbers="",
     )

@@ -1,179 +1,169 @@
-"""What the stages of the elastic arm left, and what the report counts in it."""
+"""What the stages of the elastic arm left, put together by network and by method."""
 
+import functools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from flexik.cases.elastic_arm.parts.gauges import SHOWN
 from flexik.cases.elastic_arm.parts.readings import ANGLES, HELD_OUT
 from flexik.cases.elastic_arm.section import Section
 from flexik.datasets.tables import read_csv, read_table
+from flexik.evaluation.errors import workspace_statistics
 from flexik.evaluation.regression import correlation
-from flexik.files import read_json
-from flexik.learning.size_selection import by_size, read_layers
-
-Array = NDArray[np.float64]
+from flexik.learning.size_selection import read_layers
+from flexik.reporting.style import MM
 
 DATA = Path("data/elastic_arm")
 PUBLISHED = Path("data/reference/elastic_arm/fit.csv")
 # Nearer than this to the payload of a reading, a target's payload was learnt from, kg
 NEAR = 0.1
 R = [f"r_{name}" for name in ANGLES]
+POSE = " in the pose to be found"
+# What a method knows, by what its network learnt
+KNOWS = {
+    "gauges": f"target, gauges{POSE}",
+    "gauges_without_dx": f"target, gauges but dx{POSE}",
+    "gauges_elbow": f"target, elbow, gauges{POSE}",
+    "coordinates": "target, payload, elbow",
+}
+EXTRA = {"gauges_without_dx": ", without dx", "gauges_elbow": ", and elbow"}
+
+table = functools.cache(read_table)
 
 
-@dataclass(frozen=True)
-class SizeStudy:
-    """Errors by size, the chosen layers, and how many of all runs stopped at the trainer's goal."""
+def of(name: str) -> pd.DataFrame:
+    """Table data/elastic_arm/NAME.parquet."""
+    return table(DATA.absolute() / f"{name}.parquet")
 
-    sizes: pd.DataFrame
-    chosen: tuple[int, ...]
-    n_goal: int
-    n_runs: int
+
+def chosen(frame: pd.DataFrame) -> pd.DataFrame:
+    """Rows of the restarts that were chosen."""
+    return frame[frame["chosen"] == 1]
+
+
+def by_restart(values: pd.Series, decimals: int) -> str:
+    """Millimetres of the restarts of a network, in their order."""
+    return ", ".join(f"{MM * value:.{decimals}f}" for value in values)
 
 
 @dataclass(frozen=True)
 class Results:
-    """Tables of the stages, SI units.
-
-    shown : what gauges show in the readings, by noise.
-    targets, counts : random targets, and how many were drawn, reached and kept.
-    errors : long table of the methods at the targets, by method; n_clipped among its columns.
-    restarts : mean_error and max_error of every restart, by method with a network.
-    fit, fit_restarts, sensitivity, payload_error, splits : of the studies.
-    training : restarts of all networks, column `network` first.
-    published : R by network.
-    """
+    """The results of all stages."""
 
     section: Section
-    readings: pd.DataFrame
-    shown: dict[str, pd.DataFrame]
-    targets: pd.DataFrame
-    counts: dict[str, int]
-    errors: dict[str, pd.DataFrame]
-    restarts: dict[str, pd.DataFrame]
-    fit: pd.DataFrame
-    fit_restarts: pd.DataFrame
-    sensitivity: pd.DataFrame
-    payload_error: pd.DataFrame
-    splits: pd.DataFrame
-    layers: dict[str, tuple[int, ...]]
-    training: pd.DataFrame
-    studies: dict[str, SizeStudy]
-    published: pd.DataFrame
 
     @property
     def main(self) -> str:
         """Name of the network as published."""
         return self.section.studies.splits.network
 
+    @property
+    def conditions(self) -> str:
+        """Name of the set of conditions."""
+        return next(iter(self.section.conditions))
+
+    def shown(self, noise: str) -> pd.DataFrame:
+        """What gauges show in the readings."""
+        return of(f"samples/readings.{noise}")
+
+    def layers(self, name: str) -> tuple[int, ...]:
+        """Units of the hidden layers of a network, given or chosen."""
+        network = self.section.networks[name]
+        return read_layers(DATA / f"sizes/{name}.json") if network.is_selected else network.sizes[0]
+
     def hidden(self, name: str) -> str:
-        """Layers of a network as the paper writes them, 12-40."""
-        return "-".join(str(n) for n in self.layers[name])
+        """The same as the paper writes them, 12-40."""
+        return "-".join(map(str, self.layers(name)))
 
     def joined(self, name: str) -> pd.DataFrame:
         """Readings with what the gauges show and what network `name` says, a row each."""
-        shown = self.shown[self.section.networks[name].readings]
-        fit = self.fit[self.fit["network"] == name].set_index("reading").sort_index()
-        return pd.concat(
-            [self.readings, shown[["p_x", "p_y"]], fit.drop(columns="network")], axis=1
-        )
+        shown, fit = self.shown(self.section.networks[name].readings), of("studies/fit")
+        fit = fit[fit["network"] == name].set_index("reading").drop(columns="network")
+        return pd.concat([of("samples/readings"), shown[["p_x", "p_y"]], fit], axis=1)
 
-    def target_r(self, name: str) -> Array:
-        """R (2,) of both angles at the random targets by the method of gauge network `name`.
+    @functools.cached_property
+    def errors(self) -> dict[str, pd.DataFrame]:
+        """Long tables of the methods at the random targets; n_clipped among the columns."""
+        tables = {label: of(f"errors/{self.conditions}/{label}") for label in self.section.methods}
+        return {k: frame.assign(n_clipped=frame.get("n_clipped", 0)) for k, frame in tables.items()}
 
-        NaN where no method takes the network, or its angles do not vary.
+    @functools.cached_property
+    def fits(self) -> pd.DataFrame:
+        """Networks given gauges, by name: fit to training and held-out readings, R published.
+
+        targets_: R at the random targets, NaN where no method takes the network or its angles do
+        not vary; worst_, best_: of all restarts.
         """
+        every, published = of("studies/fit.restarts"), read_csv(PUBLISHED, R, ("network",))
+        rows = chosen(every).set_index("network").loc[list(self.section.gauge_networks)]
+        rows = rows.join(published.set_index("network")[R].add_prefix("published_"))
+        least, most = (getattr(every.groupby("network")[R], which)() for which in ("min", "max"))
+        rows = rows.join(least.add_prefix("worst_")).join(most.add_prefix("best_"))
+        networks = [self.section.networks[str(name)] for name in rows.index]
+        rows["hidden"] = [self.hidden(str(name)) for name in rows.index]
+        rows["trainer"] = [network.trainer for network in networks]
+        rows["gauges"] = [
+            network.readings.replace("_", "-") + EXTRA.get(str(network.learns), "")
+            for network in networks
+        ]
+        rows["mean_errors"] = [
+            by_restart(every.loc[every["network"] == name, "mean_error"], 2) for name in rows.index
+        ]
+        rows[[f"targets_{r}" for r in R]] = np.nan
+        right = of(f"samples/{self.conditions}")[list(ANGLES)].to_numpy()
         for label, method in self.section.methods.items():
-            if method.network == name and method.method == "gauges":
-                commanded = self.errors[label][list(ANGLES)].to_numpy()
-                if np.ptp(commanded, axis=0).all():
-                    return correlation(self.targets[list(ANGLES)].to_numpy(), commanded)
-        return np.full(2, np.nan)
+            found = self.errors[label][list(ANGLES)].to_numpy()
+            if method.method == "gauges" and np.ptp(found, axis=0).all():
+                rows.loc[method.network, [f"targets_{r}" for r in R]] = correlation(right, found)
+        return rows
 
-    def published_r(self, name: str) -> Array:
-        """Published R (2,) of network `name`, NaN where there is none."""
-        return self.published.reindex([name])[R].to_numpy(dtype=float)[0]
+    @functools.cached_property
+    def positioning(self) -> pd.DataFrame:
+        """Methods by name: statistics at the random targets, m, and where they come from."""
+        rows = {}
+        for label, frame in self.errors.items():
+            method, error = self.section.methods[label], frame["error"]
+            row = {**workspace_statistics(frame), "clipped": int((frame["n_clipped"] > 0).sum())}
+            row["n_worse"] = int((error > self.errors[self.uncompensated]["error"]).sum())
+            near = self.near_payloads(frame)
+            row |= {"n_near": int(near.sum()), "near": error[near].mean()}
+            row |= {"far": error[~near].mean(), "knows": "target"}
+            if method.network is not None:
+                network = self.section.networks[method.network]
+                restarts = of(f"errors/{self.conditions}/{label}.restarts")
+                row["knows"] = KNOWS.get(str(network.learns), "target, payload")
+                row["gauges"] = network.readings.replace("_", "-") if network.has_gauges else ""
+                row |= {"hidden": self.hidden(method.network), "trainer": network.trainer}
+                row["mean_errors"] = by_restart(restarts["mean_error"], 3)
+                row["max_errors"] = by_restart(restarts["max_error"], 3)
+                row["worst_mean_error"] = restarts["mean_error"].max()
+                row["worst_max_error"] = restarts["max_error"].max()
+            rows[label] = row
+        told = of("studies/payload_error").set_index("method")["mean_error"]
+        return pd.DataFrame.from_dict(rows, orient="index").assign(told=told)
 
     @property
-    def fits(self) -> pd.DataFrame:
-        """Fit of the chosen network by name of those given gauges, in their order."""
-        chosen = self.fit_restarts[self.fit_restarts["chosen"] == 1].set_index("network")
-        return chosen.loc[list(self.section.gauge_networks)]
+    def uncompensated(self) -> str:
+        """Name of the method without compensation."""
+        return next(k for k, method in self.section.methods.items() if method.method == "none")
 
-    def all_splits(self) -> pd.DataFrame:
+    @property
+    def splits(self) -> pd.DataFrame:
         """R of the published network by every division, the main one first."""
         first = {"seed": self.section.samples.seed, **self.fits.loc[self.main, R]}
-        return pd.concat([pd.DataFrame([first]), self.splits], ignore_index=True)
+        return pd.concat([pd.DataFrame([first]), of("studies/splits")], ignore_index=True)
 
-    def on_border(self) -> tuple[int, int]:
-        """Held-out readings on the border of the grid of angles, and all held-out ones."""
-        angles = self.readings[list(ANGLES)].to_numpy()
+    def on_border(self) -> int:
+        """Number of held-out readings on the border of the grid of angles."""
+        readings = of("samples/readings")
+        angles = readings[list(ANGLES)].to_numpy()
         ends = np.isclose(angles, angles.min(axis=0)) | np.isclose(angles, angles.max(axis=0))
-        held_out = (self.readings["part"] == HELD_OUT).to_numpy()
-        return int(ends.any(axis=1)[held_out].sum()), int(held_out.sum())
+        return int(ends.any(axis=1)[readings["part"] == HELD_OUT].sum())
 
     def near_payloads(self, frame: pd.DataFrame) -> NDArray[np.bool_]:
         """Rows (n,) of `frame` whose payload is within NEAR of one of the readings'."""
         apart = np.abs(frame["payload"].to_numpy()[:, None] - self.section.samples.payloads)
         return np.asarray(apart.min(axis=1) <= NEAR)
-
-    def gauge_difference(self, shown: str) -> Array:
-        """Distance (n,) in m of the tip by equations 44 and 45 from the model's, all readings."""
-        by_model = self.readings[["tip_x", "tip_y"]].to_numpy()
-        by_gauges = self.shown[shown][["p_x", "p_y"]].to_numpy()
-        return np.asarray(np.linalg.norm(by_gauges - by_model, axis=1))
-
-
-def read(section: Section) -> Results:
-    """Results of all stages; raises DataError if a file is missing or damaged."""
-    samples, networks, studies = DATA / "samples", DATA / "networks", DATA / "studies"
-    (conditions,) = section.conditions
-    errors = DATA / "errors" / conditions
-    training = {name: pd.read_csv(networks / f"{name}.restarts.csv") for name in section.networks}
-    fields: dict[str, Any] = {
-        name: read_table(studies / f"{name}.parquet")
-        for name in ("fit", "sensitivity", "payload_error", "splits")
-    }
-    return Results(
-        section=section,
-        readings=read_table(samples / "readings.parquet"),
-        shown={shown: read_table(samples / f"readings.{shown}.parquet") for shown in SHOWN},
-        targets=read_table(samples / f"{conditions}.parquet"),
-        counts=read_json(samples / f"{conditions}.json"),
-        errors={
-            label: pd.DataFrame({"n_clipped": 0, **read_table(errors / f"{label}.parquet")})
-            for label in section.methods
-        },
-        restarts={
-            label: read_table(errors / f"{label}.restarts.parquet")
-            for label, method in section.methods.items()
-            if method.needs
-        },
-        fit_restarts=read_table(studies / "fit.restarts.parquet"),
-        layers={name: layers(section, name) for name in section.networks},
-        training=pd.concat(training, names=["network"]).reset_index(level="network"),
-        studies={
-            name: _size_study(name)
-            for name, network in section.networks.items()
-            if network.is_selected
-        },
-        published=read_csv(PUBLISHED, R, ("network",), ("network",)).set_index("network"),
-        **fields,
-    )
-
-
-def layers(section: Section, name: str) -> tuple[int, ...]:
-    """Units of the hidden layers of a network, given or chosen."""
-    network = section.networks[name]
-    return read_layers(DATA / f"sizes/{name}.json") if network.is_selected else network.sizes[0]
-
-
-def _size_study(name: str) -> SizeStudy:
-    runs = read_table(DATA / f"sizes/{name}.parquet")
-    n_goal = int((runs["stop_reason"] == "goal").sum())
-    chosen = read_layers(DATA / f"sizes/{name}.json")
-    return SizeStudy(by_size(runs), chosen, n_goal, len(runs))

@@ -6,14 +6,13 @@ from typing import Any
 
 from flexik.cases.elastic_arm.parts import evaluate, gauges, study_splits
 from flexik.cases.elastic_arm.parts.study_gauges import prepare_fit, prepare_sensitivity
-from flexik.cases.elastic_arm.parts.trained import RESTART, Trained, files_of
+from flexik.cases.elastic_arm.parts.trained import Trained, files_of
 from flexik.cases.elastic_arm.section import Gauge, Section
 from flexik.datasets.parts import Part, Work, rows
 from flexik.datasets.tables import Field
 
 PAYLOAD_ERROR_FIELDS = (
     Field("method", "1", "name of the method", "string"),
-    *RESTART,
     Field("mean_error", "m", "over the targets, where the payload is told too large"),
 )
 
@@ -28,7 +27,13 @@ def parts(section: Section) -> list[Part]:
     }
     return [
         _gauge_part(section, "fit", prepare_fit, list(section.gauge_networks)),
-        _gauge_part(section, "sensitivity", prepare_sensitivity, compared(section)),
+        _gauge_part(
+            section,
+            "sensitivity",
+            prepare_sensitivity,
+            compared(section),
+            with_restarts=section.studies.splits.network,
+        ),
         Part(
             "payload_error",
             prepare_payload_error,
@@ -49,9 +54,9 @@ def compared(section: Section) -> list[str]:
 
 
 def _gauge_part(
-    section: Section, name: str, prepare: Callable[..., Work], networks: list[str]
+    section: Section, name: str, prepare: Callable[..., Work], networks: list[str], **settings: str
 ) -> Part:
-    settings = {
+    common = {
         "machine": section.machine,
         "networks": {network: section.networks[network] for network in networks},
     }
@@ -60,7 +65,7 @@ def _gauge_part(
         "shown": {s: f"{evaluate.SAMPLES}/readings.{s}.parquet" for s in gauges.SHOWN},
         "files": {network: files_of(network) for network in networks},
     }
-    return Part(name, prepare, settings, inputs)
+    return Part(name, prepare, common | settings, inputs)
 
 
 def prepare_payload_error(
@@ -69,15 +74,15 @@ def prepare_payload_error(
     too_much: float,
     files: Mapping[str, Mapping[str, Any]],
 ) -> Work:
-    """Mean errors of methods that are told `too_much` payload (kg), by network of every start."""
+    """Mean errors of methods that are told `too_much` payload (kg)."""
     items = []
     for label, settings in methods.items():
         work = evaluate.prepare(**settings, **files[label])
-        items += [(label, work.function, trained) for trained in work.items]
+        items += [(label, work.function, trained) for trained in work.items if trained.is_chosen]
     return Work(functools.partial(_told, too_much), items, rows(*PAYLOAD_ERROR_FIELDS))
 
 
 def _told(too_much: float, item: tuple[str, Callable[..., Any], Trained]) -> dict[str, Any]:
     label, errors, trained = item
     error = errors(trained, told_too_much=too_much)["error"]
-    return {"method": [label], **trained.row, "mean_error": [error.mean()]}
+    return {"method": [label], "mean_error": [error.mean()]}

@@ -70,16 +70,18 @@ def prepare_sensitivity(
     *,
     machine: Machine,
     networks: Mapping[str, Network],
+    with_restarts: str,
     readings: Path,
     shown: Mapping[str, Path],
     files: Mapping[str, Mapping[str, Path]],
 ) -> Work:
-    """Tip errors with no input off, then each by its uncertainty.
+    """Tip errors with no input off, then each by its uncertainty; of one network from every start.
 
     The uncertainty is that of the gauges with noise, whether the network learnt with it or not.
     """
     tables = _tables(readings, shown)
-    found = [t for name, n in networks.items() for t in restarts(name, n, files[name])]
+    every = [t for name, n in networks.items() for t in restarts(name, n, files[name])]
+    found = [t for t in every if t.is_chosen or t.name == with_restarts]
     return Work(functools.partial(_sensitivity, machine, tables), found, rows(*SENSITIVITY_FIELDS))
 
 
