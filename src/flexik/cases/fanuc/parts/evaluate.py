@@ -93,7 +93,7 @@ def _methods(
         samples = read_table(path, PATH_FIELDS)
         training = samples[samples["is_test"] == 0]
         taught = array(training, POSITION_FIELDS), array(training, JOINT_FIELDS)
-        return [{"nearest_sample": NearestSample, "interpolated": Interpolated}[kind](*taught)]
+        return [NearestSample(*taught) if kind == "nearest_sample" else Interpolated(*taught)]
     return [ClosedForm(arm)]
 
 
@@ -128,7 +128,7 @@ def prepare(
         writers = {".parquet": table(results[0], FIELDS)}
         if starts:
             found = [_statistics(k, each) for k, each in enumerate(results[1:])]
-            writers[".starts.parquet"] = table(stacked(found, START_ERRORS), START_ERRORS)
+            writers[".start_errors.parquet"] = table(stacked(found, START_ERRORS), START_ERRORS)
         return writers
 
     return Work(errors_of, items, finish)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -37,19 +38,16 @@ def parts(section: Section) -> list[Part]:
     """A part for every network, or networks of one name."""
     found = []
     for name, network in section.networks.items():
-        settings = {
-            "learns": network.learns,
-            "n_hidden": network.sizes[0],
-            "activation": network.activation,
+        settings: dict[str, Any] = {
+            "architecture": Architecture(network.sizes[0], network.activation),
             "seed": network.seed,
             "trainer": section.trainers[network.trainer],
         }
         if network.learns == "arm_configuration":
             settings["arm"] = arm_of(section.machine.joints)
-            settings.pop("learns")
             found.append(Part(name, prepare_poses, settings, {"poses": SAMPLES / "poses.parquet"}))
         else:
-            settings["n_restarts"] = network.n_restarts
+            settings |= {"learns": network.learns, "n_restarts": network.n_restarts}
             found.append(Part(name, prepare_path, settings, {"path": SAMPLES / "path.parquet"}))
     return found
 
@@ -66,8 +64,7 @@ class Item:
 def prepare_path(
     *,
     learns: str,
-    n_hidden: tuple[int, ...],
-    activation: str,
+    architecture: Architecture,
     seed: int,
     trainer: Stopping,
     n_restarts: int,
@@ -81,7 +78,7 @@ def prepare_path(
     samples = TaughtSamples.of_table(read_table(path, PATH_FIELDS))
     groups = [ALL_JOINTS] if learns == "all_joints" else [(joint,) for joint in ALL_JOINTS]
     runs = [
-        Run(joints, Architecture(n_hidden, activation), trainer, seed, start * len(groups) + k)
+        Run(joints, architecture, trainer, seed, start * len(groups) + k)
         for start in range(n_restarts)
         for k, joints in enumerate(groups)
     ]
@@ -126,11 +123,12 @@ def joined_record(records: Sequence[TrainingRecord], start: int) -> TrainingReco
     """
     n = max(len(record.errors) for record in records)
     errors = [np.pad(r.errors, (0, n - len(r.errors)), constant_values=np.nan) for r in records]
-    reasons = [r.stop_reason for r in records if r.stop_reason != StopReason.ITERATIONS]
+    reasons: list[StopReason] = [r.stop_reason for r in records]
+    early = (reason for reason in reasons if reason != StopReason.ITERATIONS)
     return replace(
         records[0],
         restart=start,
-        stop_reason=(reasons or [StopReason.ITERATIONS])[0],
+        stop_reason=next(early, StopReason.ITERATIONS),
         errors=tuple(np.nanmean(errors, axis=0).tolist()),
         kept=max(record.kept for record in records),
     )
@@ -190,14 +188,13 @@ class WorkspaceItem:
 def prepare_poses(
     *,
     arm: SerialArm,
-    n_hidden: tuple[int, ...],
-    activation: str,
+    architecture: Architecture,
     seed: int,
     trainer: Stopping,
     poses: Path,
 ) -> Work:
     """One network an arm configuration, in the order of their numbers."""
-    found, architecture = read_table(poses, POSE_FIELDS), Architecture(n_hidden, activation)
+    found = read_table(poses, POSE_FIELDS)
     items = [
         WorkspaceItem(
             arm,

@@ -1,0 +1,235 @@
+"""What the stages of the six-joint arm found, as its report needs it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from flexik.cases.fanuc.parts import evaluate
+from flexik.cases.fanuc.parts.learning import percent
+from flexik.cases.fanuc.parts.samples import arm_of
+from flexik.cases.fanuc.parts.tables import (
+    COMMANDED_FIELDS,
+    JOINT_FIELDS,
+    PATH_FIELDS,
+    QUERY_FIELDS,
+    array,
+)
+from flexik.cases.fanuc.section import PUBLISHED_NETWORKS, Section
+from flexik.datasets.tables import read_csv, read_table
+from flexik.errors import DataError
+from flexik.kinematics.serial_arm import Array, SerialArm
+from flexik.kinematics.status import REACHED
+from flexik.reporting.report import digest
+
+DATA, BENCHMARKS = Path("data/fanuc"), Path("reports/benchmarks")
+PUBLISHED = Path("data/reference/fanuc/total_errors.csv")
+TIMES = ("microseconds_single", "microseconds_batched")
+GROWTH = (
+    *("n_iterations", "seconds", "mean_position_error_mm"),
+    *("mean_orientation_error_deg", "success_percent"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """Tables of the stages (SI units), published values and timings.
+
+    path : samples of the taught path
+    starts, curves, start_errors : of all networks of the path, with a column `network`
+    studies : by what was varied
+    errors : all methods on all conditions; columns conditions, method, label (the method with its
+        Newton steps), reached, met (as reached, in whatever configuration), those of the errors,
+        and those of the conditions that are no query
+    published : total error percentages by joint and network; nan: not available
+    times, growth : of benchmarks/fanuc.py, measured with the settings of now
+    """
+
+    section: Section
+    path: pd.DataFrame
+    starts: pd.DataFrame
+    curves: pd.DataFrame
+    start_errors: pd.DataFrame
+    studies: dict[str, pd.DataFrame]
+    errors: pd.DataFrame
+    published: pd.DataFrame
+    times: pd.DataFrame
+    growth: pd.DataFrame
+
+    @property
+    def arm(self) -> SerialArm:
+        """The arm."""
+        return arm_of(self.section.machine.joints)
+
+    @property
+    def networks(self) -> list[str]:
+        """Names of the networks of the path."""
+        return list(self.section.path_networks)
+
+    @property
+    def n_steps(self) -> int:
+        """Newton steps, at most."""
+        return self.section.conditions.refinement.n_steps
+
+    @cached_property
+    def start_means(self) -> pd.DataFrame:
+        """Total error, mean over the joints, percent: a row a start, a column a network."""
+        return self.starts.pivot_table(
+            index="restart", columns="network", values="error_percent", aggfunc="mean"
+        )[self.networks]
+
+    @cached_property
+    def error_percents(self) -> dict[str, Array]:
+        """Total error of each joint (6,) in percent by method, on the test samples."""
+        ranges, rows = np.ptp(array(self.path, JOINT_FIELDS), axis=0), self.of("path")
+        return {
+            str(name): percent(array(frame, COMMANDED_FIELDS), array(frame, JOINT_FIELDS), ranges)
+            for name, frame in rows.groupby("method", sort=False)
+        }
+
+    @cached_property
+    def statistics(self) -> dict[str, pd.DataFrame]:
+        """By conditions a row a label: errors in SI units, share reached, number."""
+        return {
+            str(conditions): rows.groupby("label", sort=False).agg(
+                mean=("error", "mean"),
+                median=("error", "median"),
+                max=("error", "max"),
+                mean_turn=("orientation_error", "mean"),
+                max_turn=("orientation_error", "max"),
+                reached=("reached", "mean"),
+                n=("error", "size"),
+            )
+            for conditions, rows in self.errors.groupby("conditions", sort=False)
+        }
+
+    def of(self, conditions: str) -> pd.DataFrame:
+        """Rows of `errors` of some conditions, without columns of others."""
+        rows = having(self.errors, conditions=conditions)
+        return rows.dropna(axis="columns", how="all")
+
+    def passes_needed(self, error: float) -> pd.DataFrame:
+        """By network, joint, start: passes from which on the training error stays below `error`.
+
+        A share of the range; inf where the last pass is not below.
+        """
+        ordered = self.curves.sort_values("iteration")
+        groups = ordered.groupby(["network", "joint", "restart"], sort=False)["training_error"]
+        passes = groups.agg(lambda curve: _stays_below(curve.to_numpy(), error))
+        return passes.rename("passes").reset_index()
+
+    def study_statistics(self, varied: str) -> pd.DataFrame:
+        """A row a value of what was varied: errors over the starts in percent, runs ended early."""
+        groups = self.studies[varied].groupby("value")
+        return groups.agg(
+            starts=("restart", "size"),
+            median=("error_percent", "median"),
+            least=("error_percent", "min"),
+            largest=("error_percent", "max"),
+            training=("training_percent", "median"),
+            early=("stop_reason", lambda reasons: int((reasons != "iterations").sum())),
+        ).reset_index()
+
+
+def having(frame: pd.DataFrame, **chosen: Any) -> pd.DataFrame:
+    """Rows whose columns have the values `chosen`."""
+    for column, value in chosen.items():
+        frame = frame[frame[column] == value]
+    return frame
+
+
+def label(method: str, n_steps: int) -> str:
+    """Name of a method with Newton steps after it."""
+    return f"{method}_refined_{n_steps}" if n_steps else method
+
+
+def _stays_below(errors: Array, limit: float) -> float:
+    above = np.flatnonzero(~(errors <= limit))
+    first = 0 if not len(above) else int(above[-1]) + 1
+    return float(first) if first < len(errors) else np.inf
+
+
+def read(section: Section) -> Results:
+    """All of it; raises DataError if something is missing, damaged or impossible."""
+    tables = {
+        kind: pd.concat(
+            read_table(folder / f"{name}.{kind}.parquet").assign(network=name)
+            for name in section.path_networks
+        )
+        for kind, folder in (
+            ("starts", DATA / "networks"),
+            ("curves", DATA / "networks"),
+            ("start_errors", DATA / "errors/path"),
+        )
+    }
+    studies = {
+        name: read_table(DATA / f"studies/{name}.parquet")
+        for name in type(section.studies).model_fields
+    }
+    times = read_csv(BENCHMARKS / "fanuc.csv", TIMES, ("method", "settings"), ("method",))
+    growth = read_csv(BENCHMARKS / "fanuc_growth.csv", GROWTH, ("n_hidden", "settings"))
+    return Results(
+        section=section,
+        path=read_table(DATA / "samples/path.parquet", PATH_FIELDS),
+        **tables,
+        studies=studies,
+        errors=pd.concat(
+            [_errors(section, part.name) for part in evaluate.parts(section)], ignore_index=True
+        ),
+        published=published(PUBLISHED),
+        times=times[times["settings"] == query_settings(section)],
+        growth=growth[growth["settings"] == growth_settings(section)],
+    )
+
+
+def _errors(section: Section, part: str) -> pd.DataFrame:
+    """Rows of Results.errors of the part "CONDITIONS/METHOD"."""
+    conditions, method = part.split("/")
+    queries = [field.name for field in QUERY_FIELDS]
+    asked = read_table(DATA / f"samples/conditions/{conditions}.parquet")
+    found = read_table(DATA / f"errors/{part}.parquet").drop(columns=queries)
+    found = found.join(asked.drop(columns=queries), on="point")
+    limits = section.success
+    near = (found["error"] <= limits.position) & (found["orientation_error"] <= limits.orientation)
+    met = near & (found["status"] == REACHED)
+    labels = found["n_steps"].map(lambda n_steps: label(method, n_steps))
+    return found.assign(
+        conditions=conditions,
+        method=method,
+        label=labels,
+        met=met,
+        reached=met & (found["in_configuration"] == 1),
+    )
+
+
+def published(path: Path) -> pd.DataFrame:
+    """Published total errors by joint; raises DataError unless they are percentages."""
+    table = read_csv(path, ("joint", *PUBLISHED_NETWORKS), keys=("joint",))
+    for name in PUBLISHED_NETWORKS:
+        wrong = table[(table[name] < 0.0) | (table[name] > 100.0)]
+        if len(wrong):
+            joint, value = wrong["joint"].iloc[0], wrong[name].iloc[0]
+            raise DataError(f"{path}: {name}, joint {joint}: expected 0 to 100 %, got {value}")
+    return table.set_index("joint")
+
+
+def query_settings(section: Section) -> str:
+    """Checksum of what the time of a query depends on: arm, sizes, samples, Newton steps."""
+    shapes = {n: (e.learns, e.sizes[0], e.activation) for n, e in section.networks.items()}
+    steps = section.conditions.refinement.model_dump()
+    return digest([section.machine.model_dump(), steps, shapes, section.samples.path.n_training])
+
+
+def growth_settings(section: Section) -> str:
+    """Checksum of what networks of other sizes and passes share with whole_workspace."""
+    network = section.networks["whole_workspace"]
+    parts = (
+        *(section.machine, section.conditions.random_poses, section.conditions.refinement),
+        *(section.success, section.trainers[network.trainer].but(n_iterations=1)),
+    )
+    samples = section.samples.n_poses, section.samples.seed
+    settings = [*(part.model_dump() for part in parts), *samples]
+    return digest([*settings, network.activation, network.seed])
