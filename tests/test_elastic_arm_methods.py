@@ -1,30 +1,24 @@
-"""Methods of the elastic arm, with exact functions in place of networks."""
+"""Methods of the elastic arm, with exact functions in place of networks, and their errors."""
 
-import importlib.util
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from elastic_arm import ARM, GEOMETRY, MODEL, ROOT
+from elastic_arm import GEOMETRY, HOME, MODEL, QUERY, SECTION, TARGETS, tips
 
-from flexik.datasets.elastic_arm.gauges import read, uncertainty
-from flexik.datasets.elastic_arm.readings import gauges_of
-from flexik.errors import DataError
-from flexik.evaluation.conditions import random_conditions
-from flexik.evaluation.errors import evaluate
-from flexik.evaluation.regression import correlation
-from flexik.evaluation.targets import reachable_targets
-from flexik.kinematics.elastic_arm import DEFORMATION, elbow, forward, inverse_by_rule
+from flexik.cases.elastic_arm.parts import evaluate
+from flexik.cases.elastic_arm.parts.gauge_method import GaugeNetwork
+from flexik.cases.elastic_arm.parts.kinds import KINDS
+from flexik.cases.elastic_arm.parts.trained import Trained
+from flexik.evaluation.conditions import Conditions
+from flexik.kinematics.elastic_arm import elbow
 from flexik.kinematics.status import OUT_OF_REACH, REACHED
-from flexik.multibody.elastic_arm.model import equilibria, solve
-from flexik.positioning.elastic_arm.assembly import arm_method, uncompensated
-from flexik.positioning.elastic_arm.closed_form import closed_form
-from flexik.positioning.elastic_arm.learnt_angles import GaugeNetwork, InverseNetwork
+from flexik.positioning.inverse import InverseNetwork
 from flexik.positioning.method import PositioningError
 
-TARGETS = np.array([[1.1, 0.3], [0.9, 0.7], [1.15, -0.1], [0.6, 0.85]])
-PAYLOAD = np.array([3.0, 0.5, 1.5, 2.2])
-HOME = np.zeros((4, 2))
+DEFORMED = np.arange(24.0).reshape(4, 6)
+CONDITIONS = Conditions(QUERY, HOME, np.arange(4))
+SIDE = elbow(GEOMETRY.inverse(TARGETS, HOME).values)
 
 
 def predicting(function):
@@ -32,52 +26,28 @@ def predicting(function):
 
 
 def exact_deflection(inputs):
-    angles = inputs[:, :2]
-    return equilibria(MODEL, angles, inputs[:, 2]).tip - forward(GEOMETRY, angles)
+    return tips(inputs[:, :2], inputs[:, 2]) - GEOMETRY.forward(inputs[:, :2])
 
 
-def tips(angles, payload):
-    return equilibria(MODEL, angles, payload).tip
-
-
-def test_rigid_inverse_puts_the_rigid_tip_on_targets_and_keeps_the_rest():
-    targets = np.vstack([TARGETS[:2], [[1.3, 0.0]]])
-    solution = closed_form(GEOMETRY)(targets, np.full((3, 2), 0.1))
-    assert solution.status.tolist() == [REACHED, REACHED, OUT_OF_REACH]
-    assert forward(GEOMETRY, solution.strokes[:2]) == pytest.approx(targets[:2], abs=1e-12)
-    assert solution.strokes[2].tolist() == [0.1, 0.1]
-
-
-def test_a_correction_does_not_turn_the_elbow_over():
-    """Along a line across the border between the elbows, by the rule of the original target."""
-    y = np.linspace(0.1, 0.35, 400)
-    line = np.column_stack([np.full(400, 1.12), y])
-    side = elbow(inverse_by_rule(GEOMETRY, line).angles)
-    border = int(np.flatnonzero(np.diff(side))[0])
-    original, corrected = line[[border]], line[[border + 1]]
-    inverse = closed_form(GEOMETRY)
-    alone = inverse(corrected, HOME[:1])
-    kept = inverse(corrected, HOME[:1], original)
-    assert elbow(alone.strokes)[0] == side[border + 1] != side[border] == elbow(kept.strokes)[0]
-    assert forward(GEOMETRY, kept.strokes) == pytest.approx(corrected, abs=1e-12)
+def error(label, network=None, **options):
+    """Errors of a method of params.yaml with `network`."""
+    given = evaluate.described(SECTION, "workspace", label)["settings"]
+    trained = network and Trained("it", given["network"], 0, True, network)
+    found = evaluate.errors(
+        given["machine"], given["method"], given["build"], CONDITIONS, None, trained, **options
+    )
+    return found["error"]
 
 
 def test_combined_with_the_exact_deflection_converges_to_the_target():
-    conditions = random_conditions(TARGETS, PAYLOAD)
-    errors = {
-        name: evaluate(
-            arm_method(ARM.methods[name], GEOMETRY, predicting(exact_deflection)),
-            conditions,
-            HOME,
-            tips,
-            ("theta_1", "theta_2"),
-        )["error"].to_numpy()
-        for name in ("combined", "combined_iterated")
-    }
-    none = evaluate(uncompensated(GEOMETRY), conditions, HOME, tips, ("theta_1", "theta_2"))
-    assert none["error"].min() > 1e-3
-    assert errors["combined"].max() < 1e-3
-    assert errors["combined_iterated"].max() < 1e-6
+    exact = predicting(exact_deflection)
+    assert error("none").min() > 1e-3
+    assert error("combined", exact).max() < 1e-3
+    assert error("combined_iterated", exact).max() < 1e-6
+    # each 0.05 kg too much moves the tip that much less
+    told = error("combined_iterated", exact, told_too_much=0.05)
+    sag = np.linalg.norm(GEOMETRY.forward(HOME) - tips(HOME, np.full(4, 0.05)), axis=1)
+    assert (told > 1e-5).all() and (told < sag).all()
 
 
 def test_inverse_network_is_asked_for_target_payload_and_elbow():
@@ -87,110 +57,82 @@ def test_inverse_network_is_asked_for_target_payload_and_elbow():
         asked.append(inputs)
         return np.full((len(inputs), 2), 9.0)  # beyond both limits
 
-    targets = np.vstack([TARGETS, [[1.3, 0.0]]])
-    method = InverseNetwork(GEOMETRY, predicting(predict))
-    command = method(targets, np.append(PAYLOAD, 1.0), np.zeros((5, 2)))
-    side = elbow(inverse_by_rule(GEOMETRY, TARGETS).angles)
-    assert set(side) == {-1.0, 1.0}
-    assert np.array_equal(asked[0], np.column_stack([TARGETS, PAYLOAD, side]))
-    assert command.status.tolist() == [REACHED] * 4 + [OUT_OF_REACH]
-    assert np.array_equal(command.strokes[:4], np.tile(GEOMETRY.upper, (4, 1)))
-    assert command.strokes[4].tolist() == [0.0, 0.0]
-    assert command.diagnostics["n_clipped"].tolist() == [2, 2, 2, 2, 0]
+    query = np.vstack([QUERY, [[1.3, 0.0, 1.0]]])
+    answer = InverseNetwork(GEOMETRY, predicting(predict))(query, np.zeros((5, 2)))
+    assert set(SIDE) == {-1.0, 1.0}
+    assert np.array_equal(asked[0], np.column_stack([QUERY, SIDE]))
+    assert answer.status.tolist() == [REACHED] * 4 + [OUT_OF_REACH]
+    assert np.array_equal(answer.values[:4], np.tile(GEOMETRY.upper, (4, 1)))
+    assert answer.values[4].tolist() == [0.0, 0.0]
+    assert answer.diagnostics["n_clipped"].tolist() == [2, 2, 2, 2, 0]
 
 
-EIGHT = (*DEFORMATION, "p_x", "p_y")
+@pytest.mark.parametrize(
+    ("learns", "inputs"),
+    [
+        ("gauges", np.hstack([DEFORMED, TARGETS])),
+        ("gauges_without_dx", np.hstack([DEFORMED[:, [0, 2, 3, 5]], TARGETS])),
+        ("gauges_elbow", np.column_stack([DEFORMED, TARGETS, SIDE])),
+    ],
+)
+def test_gauge_network_is_told_the_deformation_beside_the_target(learns, inputs):
+    asked = []
 
+    def predict(values):
+        asked.append(values)
+        return np.tile([0.1, 9.0], (4, 1))
 
-def test_gauge_network_is_told_the_deformation_beside_the_target():
-    deformation = np.arange(24.0).reshape(4, 6)
-
-    def predict(inputs):
-        assert np.array_equal(inputs, np.hstack([deformation, TARGETS]))
-        return 0.1 * np.ones((4, 2))
-
-    method = GaugeNetwork(GEOMETRY, predicting(predict), EIGHT, deformation)
-    command = method(TARGETS, PAYLOAD, HOME)
-    assert (command.strokes == 0.1).all() and (command.status == REACHED).all()
+    method = GaugeNetwork(GEOMETRY, predicting(predict), KINDS[learns].input_names, DEFORMED)
+    answer = method(QUERY, HOME)
+    assert np.array_equal(asked[0], inputs)
+    assert answer.values.tolist() == [[0.1, GEOMETRY.upper[1]]] * 4
+    assert answer.diagnostics["n_clipped"].tolist() == [1] * 4
+    assert (answer.status == REACHED).all()
     with pytest.raises(PositioningError, match="deformation by the gauges"):
-        method(TARGETS[:2], PAYLOAD[:2], HOME[:2])
+        method(QUERY[:2], HOME[:2])
 
 
-def test_gauge_networks_of_other_kinds_are_told_their_inputs():
-    deformation, asked = np.arange(24.0).reshape(4, 6), []
-
-    def predict(inputs):
-        asked.append(inputs)
-        return np.full((4, 2), 9.0)
-
-    network = predicting(predict)
-    for label, kind in (
-        ("published_network_without_dx", "gauges_without_dx"),
-        ("gauges_elbow_lm_noisy", "gauges_elbow"),
-    ):
-        method = arm_method(ARM.methods[label], GEOMETRY, network, deformation, kind)
-        command = method(TARGETS, PAYLOAD, HOME)
-        assert command.diagnostics["n_clipped"].tolist() == [2] * 4
-    side = elbow(inverse_by_rule(GEOMETRY, TARGETS).angles)
-    assert np.array_equal(asked[0], np.hstack([deformation[:, [0, 2, 3, 5]], TARGETS]))
-    assert np.array_equal(asked[1], np.column_stack([deformation, TARGETS, side]))
-
-
-def test_noisy_gauges_are_noisy_at_the_targets_too(monkeypatch):
-    """The stage's own choice of what a method is told."""
-    path = ROOT / "stages" / "elastic_arm_evaluate.py"
-    spec = importlib.util.spec_from_file_location("elastic_arm_evaluate", path)
-    stage = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(stage)
-    monkeypatch.setattr(stage, "trained", lambda arm, name: predicting(None))
-    angles = inverse_by_rule(GEOMETRY, TARGETS).angles
-    found = equilibria(MODEL, angles, PAYLOAD)
+def test_a_gauge_method_is_told_what_its_network_learnt_from():
     told = {
-        label: stage.chosen_method(ARM, label, MODEL, found).deformation
-        for label, method in ARM.methods.items()
-        if method.method == "gauges"
+        label: evaluate.described(SECTION, "workspace", label)["inputs"].get("shown", "")
+        for label in SECTION.methods
     }
-    exact = read(gauges_of(ARM), *found[1:], None).deformation
-    uncertain = uncertainty(gauges_of(ARM))
-    for label, deformation in told.items():
-        off = np.abs(deformation - exact)
-        network = ARM.all_networks[ARM.methods[label].network]
-        if network.readings == "noise_free":
-            assert np.array_equal(deformation, exact)
-        else:
-            assert (off[:, [0, 2, 3, 5]] > 0.0).all() and (off < 6 * uncertain).all()
-            assert (off[:, [1, 4]] > 0.0).all() == (network.readings == "noisy")
+    noisy = {"published_network_noisy", "gauges_elbow_lm_noisy"}
+    for label, path in told.items():
+        gauges = SECTION.methods[label].method == "gauges"
+        assert path.endswith(".parquet") == gauges
+        assert (".noisy.parquet" in path) == (label in noisy)
+    assert told["published_network_noisy_voltages"].endswith("workspace.noisy_voltages.parquet")
+    assert told["published_network"].endswith("workspace.noise_free.parquet")
 
 
-def test_a_gauge_method_without_gauges_is_refused():
-    with pytest.raises(PositioningError, match="deformation that the gauges show"):
-        arm_method(ARM.methods["published_network"], GEOMETRY, predicting(None))
+def test_the_table_is_of_the_chosen_start_and_the_others_stand_beside(tmp_path):
+    network = SECTION.networks["deflection"]
+    starts = [Trained("deflection", network, k, k == 1, None) for k in (0, 1)]
+    given = SECTION.machine, SECTION.methods["combined"]
+    results = [
+        evaluate.errors(*given, build, CONDITIONS, None, start)
+        for start, build in zip(starts, (lambda *_: far, lambda *_: near), strict=True)
+    ]
+    written = evaluate.written(evaluate.columns(MODEL), starts, results)
+    for extension, write in written.items():
+        write(tmp_path / f"it{extension}")
+    table = evaluate.read_table(tmp_path / "it.parquet")
+    beside = evaluate.read_table(tmp_path / "it.restarts.parquet")
+    assert table["error"].to_numpy() == pytest.approx(results[1]["error"])
+    assert beside["chosen"].tolist() == [0, 1]
+    assert beside["max_error"].tolist() == [r["error"].max() for r in results]
+    assert beside["mean_error"][0] > beside["mean_error"][1]
 
 
-def test_random_targets_of_two_joints_are_reached():
-    found = reachable_targets(
-        np.vstack([TARGETS, [[1.3, 0.0]]]),
-        np.append(PAYLOAD, 1.0),
-        closed_form(GEOMETRY),
-        lambda angles: forward(GEOMETRY, angles),
-        lambda angles, payload: solve(MODEL, angles, payload)[0].tip,
-        1e-7,
-        30,
-        n_strokes=2,
-    )
-    assert np.array_equal(found.targets, TARGETS)
-    assert tips(found.strokes, found.payload) == pytest.approx(TARGETS, abs=1e-7)
+def near(query, current):
+    """The rigid inverse."""
+    return evaluate.registry.build_of(SECTION.methods["none"])(
+        SECTION.methods["none"], evaluate.Ingredients(GEOMETRY)
+    )(query, current)
 
 
-def test_correlation_is_that_of_numpy_and_needs_variation():
-    generator = np.random.default_rng(0)
-    a = generator.normal(size=(50, 2))
-    b = a + 0.1 * generator.normal(size=(50, 2))
-    expected = [np.corrcoef(a[:, k], b[:, k])[0, 1] for k in (0, 1)]
-    assert correlation(a, b) == pytest.approx(expected, rel=1e-12)
-    assert correlation(a, -2.0 * a + 3.0) == pytest.approx([-1.0, -1.0])
-    for wrong in (np.ones((50, 2)), np.full((50, 2), np.nan)):
-        with pytest.raises(DataError, match="vary"):
-            correlation(a, wrong)
-    with pytest.raises(DataError, match="shape"):
-        correlation(a, b[:-1])
+def far(query, current):
+    """The stretched arm."""
+    answer = near(query, current)
+    return type(answer)(current, answer.status)

@@ -1,263 +1,179 @@
-"""The report of the elastic arm, from results whose statistics are known."""
+"""All stages of the elastic arm in small, and its report against what can be counted by hand."""
 
 import json
-from dataclasses import replace
+import shutil
 
 import numpy as np
 import pandas as pd
 import pytest
-from elastic_arm import ARM, GEOMETRY, MODEL
+import yaml
+from elastic_arm import ROOT
 
-from flexik.datasets.elastic_arm import gauges
-from flexik.datasets.elastic_arm.learning import EVALUATION_FIELDS, FIT_FIELDS, SENSITIVITY_FIELDS
-from flexik.datasets.elastic_arm.readings import (
-    FIELDS,
-    HELD_OUT,
-    columns_of,
-    divide,
-    gauges_of,
-    noise_generator,
-    poses,
-)
-from flexik.errors import DataError
-from flexik.learning.size_selection import by_size
-from flexik.kinematics.elastic_arm import DEFORMATION, flexible_forward, forward
-from flexik.multibody.elastic_arm.model import equilibria
-from flexik.reporting.elastic_arm import figures
-from flexik.reporting.elastic_arm.report import metrics, write_report
-from flexik.reporting.elastic_arm.results import Results, SizeStudy
-from flexik.reporting.elastic_arm.sensitivity import sensitivity_table, sensitivity_text
-from flexik.reporting.elastic_arm.tables import (
-    fit_notes,
-    fit_table,
-    positioning_notes,
-    positioning_table,
-    size_notes,
-    splits_notes,
-    weights_notes,
-)
+from flexik.cases import case as cases
+from flexik.cases.elastic_arm import report_results
+from flexik.cases.elastic_arm.parts.arm import flexible_arm
+from flexik.cases.elastic_arm.parts.gauges import SHOWN
+from flexik.cases.elastic_arm.parts.kinds import KINDS, learning_data
+from flexik.cases.elastic_arm.report import report
+from flexik.datasets.parallel import ParallelSettings
+from flexik.datasets.parts import make
+from flexik.datasets.tables import read_table
+from flexik.learning.storage import load_network, load_restarts
+from flexik.multibody.elastic_arm import equilibria
+from flexik.parameters.reading import overlay, read_yaml
 
-NAMES = ARM.gauge_networks
-DEGREES = {
-    "published_network": 0.1,
-    "published_network_noisy": 1.0,
-    "published_network_noisy_voltages": 0.3,
-    "published_network_without_dx": 0.8,
-    "published_network_lm": 0.01,
-    "network_12_40": 0.2,
-    "one_layer_15": 0.3,
-    "one_layer_28": 0.4,
-    "one_layer_28_lm": 0.02,
-    "gauges_elbow_lm_noisy": 0.5,
-    "selected_pair": 0.03,
-}
-WRONG_BY = {name: np.radians(DEGREES[name]) for name in NAMES}
-
-
-def readings():
-    angles, payload = poses(ARM.readings)
-    rows = np.arange(0, len(payload), 7)
-    angles, payload = angles[rows], payload[rows]
-    found = equilibria(MODEL, angles, payload)
-    part = divide(len(payload), 0.2, 0.2, 0)
-    columns = [angles, payload, part, forward(GEOMETRY, angles), *found]
-    shown = {}
-    for name in gauges.SHOWN:
-        read = gauges.read(gauges_of(ARM, name), *found[1:], noise_generator(ARM, name, 0))
-        tip = flexible_forward(GEOMETRY, angles, read.deformation)
-        shown[name] = pd.DataFrame(columns_of([*read, tip], gauges.FIELDS))
-    return pd.DataFrame(columns_of(columns, FIELDS)), shown
-
-
-def fit(table, shown, name):
-    """A network that turns the first joint too far by a constant, half of the readings each way."""
-    sign = np.where(np.arange(len(table)) % 2, 1.0, -1.0)
-    angles = table[["theta_1", "theta_2"]].to_numpy() + np.outer(sign, [WRONG_BY[name], 0.001])
-    deformation = table[["dy_1", "dx_1", "dphi_1", "dy_2", "dx_2", "dphi_2"]].to_numpy()
-    tip = flexible_forward(GEOMETRY, angles, deformation)
-    columns = [np.full(len(table), name), np.arange(len(table)), angles, tip, tip]
-    return pd.DataFrame(columns_of(columns, FIT_FIELDS))
-
-
-def sensitivity(table):
-    """Every input off adds a millimetre to an error of one, dx_1 a hundred."""
-    changes = dict(zip(("nothing", *DEFORMATION), [0.0, *np.arange(1.0, 7.0)], strict=True))
-    reading = int(np.flatnonzero(table["part"] == HELD_OUT)[0])
-    rows = [
-        (name, changed, change * 1e-6, reading, {"nothing": 1e-3, "dx_1": 0.1}.get(changed, 2e-3))
-        for name in NAMES
-        for changed, change in changes.items()
-        if not (name.endswith("without_dx") and changed.startswith("dx"))
-    ]
-    return pd.DataFrame(rows, columns=[field.name for field in SENSITIVITY_FIELDS])
-
-
-def errors(scale, seed):
-    generator = np.random.default_rng(seed)
-    n = 60
-    error = scale * generator.standard_normal((n, 2))
-    targets = generator.uniform([0.6, 0.0], [1.1, 0.8], (n, 2))
-    payload = np.where(np.arange(n) % 2, 1.0, generator.uniform(1.2, 1.8, n))
-    columns = [np.arange(n), targets, payload, targets, targets - error, error]
-    columns += [np.linalg.norm(error, axis=1), np.zeros(n, dtype=np.int64), np.arange(n) % 3]
-    return pd.DataFrame(columns_of(columns, EVALUATION_FIELDS))
+STAGES = ("generate", "select", "train", "evaluate", "study")
+MAIN = "published_network"
+SMALL = {"studies": {"splits": {"seeds": [2]}}}
 
 
 @pytest.fixture(scope="module")
-def results():
-    table, shown = readings()
-    training = [
-        {
-            "network": name,
-            "restart": 0,
-            "n_iterations": 10,
-            "training_error": 0.01,
-            "selection_error": 0.02,
-        }
-        for name in ARM.all_networks
-    ]
-    study = pd.DataFrame(
-        [
-            (first, second, restart, 0.1, 1.0 / (first + second + restart), 5, "iterations")
-            for first in (5, 10)
-            for second in (3, 8)
-            for restart in (0, 1)
-        ],
-        columns=[
-            *("n_hidden_1", "n_hidden_2", "restart", "training_error"),
-            *("selection_error", "n_iterations", "stop_reason"),
-        ],
-    )
-    layers = {
-        name: tuple(getattr(network, "n_hidden", (10, 8)))
-        for name, network in ARM.all_networks.items()
+def project(tmp_path_factory):
+    """A folder with the results of all stages by the smoke profile, the current one."""
+    folder = tmp_path_factory.mktemp("project")
+    given, profile = read_yaml(ROOT / "params.yaml"), read_yaml(ROOT / "profiles/smoke.yaml")
+    data = {
+        "trainers": overlay(given["trainers"], _known(profile["trainers"], given["trainers"])),
+        "elastic_arm": overlay(overlay(given["elastic_arm"], profile["elastic_arm"]), SMALL),
     }
-    scales = {"none": 1e-2} | {label: 1e-3 * (k + 1) for k, label in enumerate(ARM.methods)}
-    by_method = {label: errors(s, k) for k, (label, s) in enumerate(scales.items())}
-    one = by_method["none"]
-    return Results(
-        arm=ARM,
-        readings=table,
-        shown=shown,
-        fit=pd.concat([fit(table, shown, name) for name in NAMES], ignore_index=True),
-        layers=layers,
-        training=pd.DataFrame(training),
-        studies={"selected_pair": SizeStudy(by_size(study), (10, 8), 0, len(study))},
-        errors=by_method,
-        targets=one[["target_x", "target_y", "payload", "theta_1", "theta_2"]],
-        target_counts={"drawn": 500, "reached": 70, "kept": len(one)},
-        sensitivity=sensitivity(table),
-        payload_error=pd.DataFrame({"method": "combined", "point": [0, 1], "error": [1e-3, 3e-3]}),
-        splits=pd.DataFrame({"seed": [2, 3], "r_theta_1": [0.4, 0.6], "r_theta_2": [0.7, 0.8]}),
-        published=pd.DataFrame(
-            {"network": ["published_network"], "r_theta_1": [0.5], "r_theta_2": [0.5]}
-        ),
+    (folder / "params.yaml").write_text(yaml.safe_dump(data, sort_keys=False))
+    for name in ("machines", "reference"):
+        shutil.copytree(ROOT / "data" / name, folder / "data" / name)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        section = cases.load("elastic_arm", folder / "params.yaml")
+        cases.module("elastic_arm", "section").check(section)
+        for stage in STAGES:
+            parts = cases.parts("elastic_arm", section, stage)
+            make(cases.folder("elastic_arm", stage), parts, ParallelSettings(n_workers=1))
+        report(section)
+        yield folder, section
+
+
+def _known(changes, base):
+    return {name: value for name, value in changes.items() if name in base}
+
+
+@pytest.fixture
+def page(project):
+    return (project[0] / "reports/elastic_arm/README.md").read_text()
+
+
+@pytest.fixture
+def metrics(project):
+    return json.loads((project[0] / "reports/elastic_arm/metrics.json").read_text())
+
+
+def csv(project, name):
+    return pd.read_csv(project[0] / f"reports/elastic_arm/{name}.csv")
+
+
+def data(project, name):
+    return read_table(project[0] / f"data/elastic_arm/{name}.parquet")
+
+
+def test_metrics_are_flat_finite_numbers_of_all_networks_and_methods(project, metrics):
+    section = project[1]
+    assert all(np.isfinite(value) for value in metrics.values())
+    for name in section.gauge_networks:
+        assert -1.0 <= metrics[f"{name}.r_theta1"] <= 1.0
+    for label in section.methods:
+        error = 1e3 * data(project, f"errors/workspace/{label}")["error"]
+        assert len(error) == 30
+        assert metrics[f"{label}.mean_error_mm"] == pytest.approx(error.mean(), abs=1e-4)
+        assert metrics[f"{label}.max_error_mm"] == pytest.approx(error.max(), abs=1e-4)
+    assert metrics["select.selected_pair.n_hidden_2"] == 3
+    assert sum(metrics[f"readings.n_{part}"] for part in ("training", "selection", "held_out")) == (
+        len(data(project, "samples/readings"))
     )
 
 
-def test_fit_is_that_of_the_held_out_readings(results):
-    table = results.readings[results.readings["part"] == HELD_OUT]
-    rows = table.index.to_numpy()
-    sign = np.where(rows % 2, 1.0, -1.0)
-    for name in ("published_network", "published_network_noisy"):
-        found = results.fit_of(name, HELD_OUT)
-        turned = table["theta_1"] + sign * WRONG_BY[name]
-        assert found.r[0] == pytest.approx(np.corrcoef(table["theta_1"], turned)[0, 1])
-        # the arm turned about its first joint, and a little about its second
-        reach = np.hypot(table["tip_x"], table["tip_y"])
-        assert found.mean_error == pytest.approx((reach * WRONG_BY[name]).mean(), abs=7e-4)
-    ours = fit_table(results).set_index("network")
-    assert ours.loc["published_network", "R theta_1, published"] == 0.5
-    assert np.isnan(ours.loc["network_12_40", "R theta_1, published"])
-    assert ours.loc["network_12_40", "hidden"] == "12-40"
+def test_fit_and_sensitivity_are_those_of_the_held_out_readings(project, metrics):
+    samples = project[0] / "data/elastic_arm/samples"
+    readings = read_table(samples / "readings.parquet")
+    held_out = readings[readings["part"] == "held_out"]
+    paths = samples / "readings.parquet", samples / "readings.noise_free.parquet"
+    inputs, angles = learning_data("gauges", *paths).held_out
+    arm = flexible_arm(project[1].machine)
+    network, record = load_network(project[0] / f"data/elastic_arm/networks/{MAIN}.json")
 
+    def tip_error(inputs):
+        found = np.clip(network.predict(inputs), arm.geometry.lower, arm.geometry.upper)
+        tip = equilibria(arm, found, held_out["payload"].to_numpy()).tip
+        return 1e3 * np.linalg.norm(tip - held_out[["tip_x", "tip_y"]], axis=1)
 
-def test_notes_follow_the_data(results):
-    published, at_targets, layers = fit_notes(results)
-    assert published.startswith("Published R reached on held-out readings by `published_network`")
-    assert at_targets.startswith("R at the random targets by `published_network`")
-    # both measures, no verdict
-    assert "one layer `one_layer_15`" in layers and "several `published_network`" in layers
-    missed = replace(results, published=results.published.assign(r_theta_1=0.9999999))
-    assert fit_notes(missed)[0].startswith("Published R missed")
-    first, second = splits_notes(missed)
-    assert "missed by the main division" in first and "reached in 0 of 3" in first
-    assert "reached by the main division" in second and "reached in 3 of 3" in second
-    notes = positioning_notes(results)
-    assert sum("on held-out readings" in note for note in notes) == 6
-    assert any("told 0.05 kg more than there is, mean 2.000 mm" in note for note in notes)
-    clipped = positioning_table(results).set_index("method")["clipped"]
-    assert clipped["published_network"] == 40
-    near = results.errors["published_network"].query("payload == 1.0")["error"].mean()
-    assert f"{1e3 * near:.2f} mm at the 30 targets" in notes[0]
-
-
-def test_a_choice_on_the_border_is_told(results):
-    sizes = results.studies["selected_pair"].sizes
-    assert len(size_notes(sizes, (10, 8))) == 2
-    assert size_notes(sizes, (5, 3)) == []
-    goal, weights = weights_notes(results, "selected_pair")
-    assert goal.startswith("0 of 8 runs")
-    assert f"{10 * 9 + 8 * 11 + 2 * 9} weights" in weights
-
-
-def test_what_the_gauges_tell_is_computed(results):
-    table = sensitivity_table(results).set_index("input that is off")
-    assert table.loc["nothing", "published_network"] == pytest.approx(1.0)
-    assert table.loc["dx_1", "published_network"] == pytest.approx(100.0)
-    assert np.isnan(table.loc["dx_1", "published_network_without_dx"])
-    assert table.loc["dx_1", "off by (um, urad)"] == pytest.approx(2.0)
-    text = sensitivity_text(results)
-    assert "depends most on dx_1: 100.00 mm with dx_1 off by 2 micrometres" in text
-    assert "noise of the strains" in text
-    by = results.fit.copy()
-    turn = {"published_network_noisy": "published_network_noisy_voltages"}
-    by["network"] = by["network"].replace({**turn, **{b: a for a, b in turn.items()}})
-    assert "noise of the voltages" in sensitivity_text(replace(results, fit=by))
-
-
-def test_held_out_readings_on_the_border_are_counted(results):
-    table = results.readings[results.readings["part"] == HELD_OUT]
-    theta = np.degrees(table[["theta_1", "theta_2"]]).round()
-    on = theta["theta_1"].isin([0, 30]) | theta["theta_2"].isin([-35, 60])
-    assert results.on_border() == (int(on.sum()), len(table))
-
-
-def test_metrics_are_flat_finite_numbers(results):
-    found = metrics(results)
-    assert all(np.isfinite(value) for value in found.values())
+    predicted = network.predict(inputs)
     for k in (0, 1):
-        r = results.fit_of("published_network", HELD_OUT).r[k]
-        assert found[f"published_network.r_theta{k + 1}"] == pytest.approx(r, abs=1e-6)
-    for label in ("none", *ARM.methods):
-        error = 1e3 * results.errors[label]["error"]
-        assert found[f"{label}.mean_error_mm"] == pytest.approx(error.mean(), abs=1e-4)
-        assert found[f"{label}.max_error_mm"] == pytest.approx(error.max(), abs=1e-4)
-    assert found["select.selected_pair.n_hidden_1"] == 10
+        r = np.corrcoef(angles[:, k], predicted[:, k])[0, 1]
+        assert metrics[f"{MAIN}.r_theta{k + 1}"] == pytest.approx(r, abs=1e-6)
+    assert metrics[f"{MAIN}.held_out_mean_error_mm"] == pytest.approx(
+        tip_error(inputs).mean(), abs=1e-3
+    )
+    table = csv(project, "sensitivity").set_index("input that is off")
+    off = 1e-6 * table.loc["dx_2", "off by (um, urad)"] * (np.arange(8) == 4)
+    assert KINDS["gauges"].input_names[4] == "dx_2"
+    assert table.loc["dx_2", MAIN] == pytest.approx(tip_error(inputs + off).mean(), abs=1e-3)
+    assert np.isnan(table.loc["dx_1", "published_network_without_dx"])
+    # of every start, the chosen one among them
+    starts = data(project, "studies/fit.restarts").query(f"network == '{MAIN}'")
+    assert starts["restart"].tolist() == [0, 1]
+    assert starts.set_index("restart").loc[record.restart, "chosen"] == 1
 
 
-def test_report_is_whole_and_the_same_again(results, tmp_path):
-    published = tmp_path / "fit.csv"
-    results.published.to_csv(published, index=False)
-    for folder in ("a", "b"):
-        write_report(results, tmp_path / folder, [published])
-    files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*.*"))
-    assert {"README.md", "metrics.json", "fit.csv", "gauges.md"} <= {str(f) for f in files}
-    assert len([f for f in files if f.suffix == ".png"]) == 6
-    for file in files:
-        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
-    page = (tmp_path / "a/README.md").read_text()
+def test_tables_hold_ours_beside_the_published_and_the_restarts(project):
+    fit = csv(project, "fit").set_index("network")
+    assert fit.loc[MAIN, "R theta_1, published"] == 0.999742
+    assert np.isnan(fit.loc["network_12_40", "R theta_1, published"])
+    assert fit.loc["network_12_40", "hidden"] == "3-5"
+    errors = csv(project, "positioning_errors").set_index("method")
+    networks = project[0] / "data/elastic_arm/networks"
+    for label, method in project[1].methods.items():
+        n = len(load_restarts(networks / f"{method.network}.restarts.json")) if method.needs else 0
+        shown = errors.loc[label, "mean by restart (mm)"]
+        assert (0 if shown != shown else len(str(shown).split(", "))) == n
+    assert csv(project, "splits")["division"].tolist() == [
+        *("main", "other", "median", "largest - least", "published")
+    ]
+
+
+def test_sentences_follow_the_data(project, page, monkeypatch, tmp_path):
+    assert f"Published R missed on held-out readings by `{MAIN}`" in page
     assert "No controller knows that" in page and "`combined`" in page
-    assert json.loads((tmp_path / "a/metrics.json").read_text()) == metrics(results)
+    assert "one layer `one_layer_" in page and "several `" in page
+    assert page.count("on held-out readings, whose payloads it learnt from") == 6
+    assert page.count("told 0.05 kg more than there is") == 4
+    assert "Layer 2: the choice is the largest that was tried." in page
+    assert (
+        "With one input off by what the assumed gauges leave uncertain it depends most on" in page
+    )
+    easy = tmp_path / "fit.csv"
+    easy.write_text(f"network,r_theta_1,r_theta_2\n{MAIN},-1.0,0.9999999\n")
+    monkeypatch.setattr(report_results, "PUBLISHED", easy)
+    monkeypatch.setattr("flexik.cases.elastic_arm.report.REPORT", tmp_path / "report")
+    report(project[1])
+    page = (tmp_path / "report/README.md").read_text()
+    assert "Published R of theta_1, -1.000000: reached by the main division" in page
+    assert "reached in 2 of 2" in page and "reached in 0 of 2" in page
 
 
-def test_figures_refuse_what_they_cannot_show(results, tmp_path):
-    shown = results.shown[gauges.FREE_OF_NOISE]
-    with pytest.raises(DataError, match="no reading at theta_1"):
-        figures.deformation(tmp_path / "a.png", results.readings, shown, shown, 1, 0.123)
-    assert not (tmp_path / "a.png").exists()
+def test_report_is_whole_and_the_same_again(project):
+    folder = project[0] / "reports/elastic_arm"
+    files = {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*.*")}
+    assert sum(path.suffix == ".png" for path in files) == 6
+    assert {"README.md", "metrics.json", "fit.csv", "gauges.md"} <= {str(path) for path in files}
+    shutil.rmtree(folder)
+    report(project[1])
+    assert files == {p.relative_to(folder): p.read_bytes() for p in folder.rglob("*.*")}
 
 
-def test_an_r_that_rounds_to_one_is_drawn(tmp_path):
-    figures.network_comparison(tmp_path / "a.png", {"a": np.ones(2)}, {})
-    assert (tmp_path / "a.png").exists()
+def test_held_out_readings_on_the_border_are_counted(project):
+    readings = data(project, "samples/readings").query("part == 'held_out'")
+    theta = np.degrees(readings[["theta_1", "theta_2"]]).round()
+    on = theta["theta_1"].isin([0, 30]) | theta["theta_2"].isin([-35, 60])
+    assert report_results.Results(project[1]).on_border() == int(on.sum())
+
+
+def test_noise_costs_of_the_page_are_of_all_three_gauges(project, page):
+    given = {network.readings for network in project[1].networks.values() if network.has_gauges}
+    assert given == set(SHOWN)
+    assert "Noise in the voltages alone changes the mean tip error by" in page

@@ -153,8 +153,10 @@ def tables(tmp_path_factory):
     """All samples of a coarse grid and few targets, as the stage makes them."""
     given = SECTION.samples
     axes = {name: getattr(given, name) for name in ("theta_1_degrees", "theta_2_degrees")}
-    coarse = {name: axis.model_copy(update={"increment": 15.0 if k == 0 else 19.0})
-              for k, (name, axis) in enumerate(axes.items())}
+    coarse = {
+        name: axis.model_copy(update={"increment": 15.0 if k == 0 else 19.0})
+        for k, (name, axis) in enumerate(axes.items())
+    }
     drawn = SECTION.conditions["workspace"].model_copy(update={"n_targets": 12})
     update = {"samples": given.model_copy(update=coarse), "conditions": {"workspace": drawn}}
     folder = tmp_path_factory.mktemp("samples")
@@ -202,6 +204,23 @@ def test_targets_are_reached_within_the_range_of_the_readings(tables):
     assert tip == pytest.approx(targets[["target_x", "target_y"]].to_numpy(), abs=1e-7)
     low, high = np.radians([[0.0, -35.0], [30.0, 60.0]])
     assert ((angles >= low) & (angles <= high)).all() and len(targets) == 12
+
+
+def test_gauges_are_noisy_at_the_targets_too(tables):
+    exact, noisy, voltages = (
+        read_table(tables / f"workspace.{shown}.parquet")[list(DEFORMATION)].to_numpy()
+        for shown in gauges.SHOWN
+    )
+    assert (exact[:, 4] < 0.0).any() and exact.shape == (12, 6)
+    uncertain = gauges.uncertainty(GAUGES)
+    for shown, strains_are_exact in ((noisy, False), (voltages, True)):
+        off = np.abs(shown - exact)
+        assert (off[:, [0, 2, 3, 5]] > 0.0).all() and (off < 6 * uncertain).all()
+        assert (off[:, [1, 4]] == 0.0).all() == strains_are_exact
+    of_readings = read_table(tables / "readings.noisy.parquet")[list(DEFORMATION)].to_numpy()
+    exact_there = read_table(tables / "readings.noise_free.parquet")[list(DEFORMATION)].to_numpy()
+    # another stream of the same seed
+    assert not np.allclose((of_readings - exact_there)[:12, 1], (noisy - exact)[:, 1], atol=1e-9)
 
 
 def test_inputs_of_the_published_network_are_in_its_order():

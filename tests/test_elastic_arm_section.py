@@ -1,108 +1,114 @@
-"""Every mistake in the section of the elastic arm names its key."""
+"""Every mistake in the section and the machine file of the elastic arm names its key."""
 
 import copy
+from pathlib import Path
 
 import pytest
-from elastic_arm import ROOT
+from elastic_arm import ROOT, SECTION
 
+from flexik.cases import case as cases
 from flexik.errors import ParameterError
-from flexik.parameters import read_yaml, validate
+from flexik.parameters.reading import read_yaml
 
-ORIGINAL = read_yaml(ROOT / "params.yaml")
+FILES = (Path("params.yaml"), Path("data/machines/elastic_arm.yaml"))
+ORIGINAL = {file: read_yaml(ROOT / file) for file in FILES}
+NETWORK = "networks.published_network"
 WRONG = [
-    ("geometry.lengths", [0.57, -0.62]),
-    ("geometry.theta_1_degrees", [35.0, -5.0]),
-    ("structure.tube.wall", 0.01),
-    ("structure.gravity", 0.0),
-    ("structure.n_elements", 0),
-    ("structure.n_elements", 1000000),
-    ("structure.youngs_modulus", 1.0e6),
-    ("structure.youngs_modulus", 1.0e30),
-    ("gauges.voltage_range", [5.0, -5.0]),
-    ("gauges.slopes.1", [0.0016, 0.0, 0.0022]),
-    ("gauges.deflection_stations.0", 0.6),
-    ("gauges.strain_stations.1", 0.62),
-    ("gauges.noise", -1.0),
-    ("readings.theta_2_degrees.increment", 7.0),
-    ("readings.theta_1_degrees.maximum", 40.0),
-    ("readings.payloads", [0.0, 1.0, 1.0]),
-    ("readings.payloads", []),
-    ("readings.payloads", [0.0, 1.0e4]),
-    ("readings.held_out_share", 0.0001),
-    ("readings.selection_share", 0.8499),
-    ("readings.theta_1_degrees.increment", 1.0e-6),
-    ("splits.seeds", [2, 2]),
-    ("splits.seeds", [1]),
-    ("splits.network", "deflection"),
-    ("workspace.payload", [0.0, 10.0]),
-    ("workspace.payload_error", 0.0),
-    ("readings.held_out_share", 0.85),
-    ("readings.selection_share", 0.0),
-    ("networks.published_network.readings", None),
+    ("machine.geometry.lengths", [0.57, -0.62]),
+    ("machine.geometry.theta_1_degrees", [35.0, -5.0]),
+    ("machine.structure.tube.wall", 0.01),
+    ("machine.structure.gravity", 0.0),
+    ("machine.structure.n_elements", 0),
+    ("machine.structure.n_elements", 1000000),
+    ("machine.structure.youngs_modulus", 1.0e6),
+    ("machine.structure.youngs_modulus", 1.0e30),
+    ("machine.gauges.voltage_range", [5.0, -5.0]),
+    ("machine.gauges.slopes.1", [0.0016, 0.0, 0.0022]),
+    ("machine.gauges.deflection_stations.0", 0.6),
+    ("machine.gauges.strain_stations.1", 0.62),
+    ("machine.gauges.noise", -1.0),
+    ("samples.theta_2_degrees.increment", 7.0),
+    ("samples.theta_1_degrees.maximum", 40.0),
+    ("samples.theta_1_degrees.increment", 1.0e-6),
+    ("samples.payloads", [0.0, 1.0, 1.0]),
+    ("samples.payloads", []),
+    ("samples.payloads", [0.0, 1.0e4]),
+    ("samples.held_out_share", 0.0001),
+    ("samples.held_out_share", 0.85),
+    ("samples.selection_share", 0.8499),
+    ("samples.selection_share", 0.0),
+    ("studies.splits.seeds", [2, 2]),
+    ("studies.splits.seeds", [1]),
+    ("studies.splits.network", "deflection"),
+    ("studies.splits.network", "selected_pair"),
+    ("studies.payload_error", 0.0),
+    ("conditions", {}),
+    ("conditions.readings", ORIGINAL[FILES[0]]["elastic_arm"]["conditions"]["workspace"]),
+    ("conditions.workspace.payload", [0.0, 10.0]),
+    ("conditions.workspace.x", [1.2, 0.5]),
     ("networks.deflection.readings", "noisy"),
-    ("networks.published_network.n_hidden", []),
-    ("networks.published_network.n_hidden.1", 0),
-    ("networks.published_network.trainer", "nothing"),
-    ("networks.published_network.kind", "rigid"),
-    ("selected_networks.selected_pair.select.trainer", "nothing"),
-    ("selected_networks.selected_pair.select.n_hidden.0.increment", 7),
-    ("workspace.x", [1.2, 0.5]),
+    (f"{NETWORK}.n_hidden", []),
+    (f"{NETWORK}.n_hidden.1", 0),
+    (f"{NETWORK}.trainer", "nothing"),
+    (f"{NETWORK}.learns", "rigid"),
+    (f"{NETWORK}.corrects", "deflection"),
+    ("networks.selected_pair.select.trainer", "nothing"),
+    ("networks.selected_pair.n_hidden.0.increment", 7),
     ("methods.combined.network", "inverse"),
     ("methods.combined.network", "nothing"),
-    ("methods.combined.n_corrections", 0),
     ("methods.combined.network", "gauges_elbow_lm_noisy"),
+    ("methods.combined.n_corrections", 0),
     ("methods.inverse_network.network", "published_network"),
+    ("methods.published_network.network", "deflection"),
     ("methods.published_network.network", "published_network_lm"),
     ("methods.published_network.method", "oracle"),
-    ("trainers.back_propagation.minimum_rate", 1.0),
+    ("methods.select", {"method": "none"}),
+    ("methods.none", {"method": "gauges", "network": "published_network"}),
 ]
 
 
-def changed(key, value):
-    data = copy.deepcopy(ORIGINAL)
-    *path, last = (int(part) if part.isdigit() else part for part in key.split("."))
-    section = data["elastic_arm"]
-    for name in path:
-        section = section[name]
-    section[last] = value
-    return data
+@pytest.fixture
+def changed(monkeypatch):
+    """Load the section with another value of a key."""
+
+    def change(key, value):
+        files = copy.deepcopy(ORIGINAL)
+        section = files[FILES[0]]["elastic_arm"]
+        if key.startswith("machine."):
+            section, key = files[FILES[1]], key.removeprefix("machine.")
+        *path, last = (int(part) if part.isdigit() else part for part in key.split("."))
+        for name in path:
+            section = section[name]
+        section[last] = value
+        monkeypatch.setattr(cases, "_read", lambda file: files[Path(file)])
+        return cases.load("elastic_arm")
+
+    return change
 
 
-def mistake(data):
+@pytest.mark.parametrize(("key", "value"), WRONG, ids=lambda value: str(value)[:40])
+def test_a_wrong_value_names_its_key(changed, key, value):
     with pytest.raises(ParameterError) as raised:
-        validate(data)
-    return str(raised.value)
-
-
-@pytest.mark.parametrize(("key", "value"), WRONG, ids=[f"{k}={v}" for k, v in WRONG])
-def test_a_wrong_value_names_its_key(key, value):
-    text = mistake(changed(key, value))
-    # a list, or one whole section, may be what is wrong
+        changed(key, value)
+    (line,) = str(raised.value).splitlines()
+    file, named, _ = line.split(": ", 2)
+    prefix, of_file = ("", FILES[1]) if key.startswith("machine.") else ("elastic_arm.", FILES[0])
+    key = prefix + key.removeprefix("machine.")
+    # what holds the value may be told, or an entry of it
     parents = {key, key.rpartition(".")[0]}
-    if key.endswith("method"):
-        parents = {key.removesuffix(".method")}
-    assert any(f"params.yaml: elastic_arm.{parent}" in text for parent in parents), text
+    assert Path(file) == of_file
+    assert any(part.startswith(tuple(parents)) for part in named.split(", "))
 
 
-def test_names_stand_once_and_are_free():
-    networks = ORIGINAL["elastic_arm"]["networks"]
-    selected = ORIGINAL["elastic_arm"]["selected_networks"]["selected_pair"]
-    twice = changed("selected_networks", {"deflection": selected})
-    assert "selected_networks.deflection: stands under networks too" in mistake(twice)
-    taken = changed("networks", {**networks, "none": networks["deflection"]})
-    assert "networks.none: the name is taken" in mistake(taken)
+def test_methods_of_the_crane_run_here_too(changed):
+    tip = {"learns": "tip", "n_hidden": 10, "n_restarts": 2}
+    networks = {**ORIGINAL[FILES[0]]["elastic_arm"]["networks"], "tip": tip}
+    with pytest.raises(ParameterError, match="there is no network 'tip'"):
+        changed("methods.direct", {"method": "direct", "network": "tip"})
+    assert changed("networks", networks).networks["tip"].sizes == [(10,)]
 
 
-def test_a_network_given_gauges_is_needed():
-    networks = ORIGINAL["elastic_arm"]["networks"]
-    data = changed("networks", {k: networks[k] for k in ("deflection", "inverse")})
-    data["elastic_arm"]["selected_networks"] = {}
-    data["elastic_arm"]["methods"] = {}
-    text = mistake(data)
-    assert "splits.network" in text and "of kind gauges, the published idea" in text
-
-
-def test_angles_are_in_degrees_and_radians_inside():
-    from elastic_arm import GEOMETRY
-
-    assert GEOMETRY.limits[0] == pytest.approx((-0.08726646, 0.61086524))
+def test_networks_given_gauges():
+    assert len(SECTION.gauge_networks) == 11
+    assert SECTION.networks["selected_pair"].sizes[0] == (5, 5)
+    assert SECTION.networks["selected_pair"].is_selected

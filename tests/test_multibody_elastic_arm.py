@@ -121,7 +121,11 @@ def test_tube():
     tube = Tube(0.04, 0.02, 0.0015)
     assert tube.second_moment == pytest.approx(1.15e-8, rel=0.005)
     assert 2700 * tube.area == pytest.approx(0.46, abs=0.005)
-    assert SECTION.machine.structure.tube.model_dump() == {"width": 0.04, "height": 0.02, "wall": 0.0015}
+    assert SECTION.machine.structure.tube.model_dump() == {
+        "width": 0.04,
+        "height": 0.02,
+        "wall": 0.0015,
+    }
 
 
 def test_a_failed_equilibrium_is_a_row_or_an_error(monkeypatch):

@@ -4,7 +4,7 @@ import json
 
 import pandas as pd
 import pytest
-from elastic_arm import ARM, ROOT
+from elastic_arm import ROOT, SECTION
 
 PUBLISHED = pd.read_csv(ROOT / "data/reference/elastic_arm/fit.csv").set_index("network")
 
@@ -49,7 +49,8 @@ def test_a_wrong_payload_costs_the_combined_method_more_than_its_own_error(metri
 
 
 def test_positioning_without_gauges_meets_its_target(metrics):
-    assert metrics["combined.mean_error_mm"] <= 0.2
+    # by the network of every start
+    assert metrics["combined.restarts.max_mean_error_mm"] <= 0.2
     assert metrics["combined_iterated.max_error_mm"] <= 0.2
     assert metrics["inverse_network.mean_error_mm"] < 0.2 * metrics["none.mean_error_mm"]
 
@@ -58,6 +59,6 @@ def test_nothing_failed_and_all_readings_were_used(metrics):
     assert sum(metrics[f"readings.n_{part}"] for part in ("training", "selection", "held_out")) == (
         560
     )
-    for label in ("none", *ARM.methods):
+    for label in SECTION.methods:
         assert metrics[f"{label}.n_failed"] == 0
         assert metrics[f"{label}.mean_error_mm"] <= metrics[f"{label}.max_error_mm"]

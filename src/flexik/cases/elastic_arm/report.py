@@ -45,11 +45,15 @@ def metrics(results: Results) -> dict[str, float | None]:
         for which in ("mean_error", "max_error"):
             found[f"{name}.held_out_{which}_mm"] = round(MM * fit[which], 4)
     names = ["mean_error", "median_error", "p95_error", "max_error"]
-    names += ["worst_mean_error", "worst_max_error", "told"]
+    titles = {
+        "worst_mean_error": "restarts.max_mean_error",
+        "worst_max_error": "restarts.max_max_error",
+        "told": "payload_off_mean_error",
+    }
     for label, row in results.positioning.iterrows():
-        for which in names:
+        for which in (*names, *titles):
             if np.isfinite(row[which]):
-                title = {"told": "payload_off_mean_error"}.get(which, which)
+                title = titles.get(which, which)
                 found[f"{label}.{title}_mm"] = round(MM * row[which], 4)
         found[f"{label}.n_failed"] = int(row["n_failed"])
     for changed, error in sensitivity(results.main).drop(NOTHING).items():

@@ -2,8 +2,11 @@
 
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from flexik.errors import ParameterError
+from flexik.kinematics.status import REACHED
 from flexik.parameters.conditions import RandomTargets, check_different
 from flexik.parameters.model import (
     Interval,
@@ -224,7 +227,7 @@ class Section(Model):
     trainers: dict[Name, Trainer]
     samples: Samples
     networks: dict[Name, Network]
-    conditions: dict[Name, RandomTargets]
+    conditions: Annotated[dict[Name, RandomTargets], Field(min_length=1)]
     methods: dict[Name, AnyMethod]
     studies: Studies
 
@@ -284,3 +287,18 @@ class Section(Model):
         for name in (*self.networks, *self.methods):
             if name in TAKEN_NAMES:
                 raise ValueError(f"methods.{name}: the name is taken")
+
+
+def check(section: Section) -> None:
+    """Some of the area of random targets is reached; raises ParameterError naming the key."""
+    from flexik.cases.elastic_arm.parts.geometry import geometry_of
+
+    geometry = geometry_of(section.machine)
+    for name, drawn in section.conditions.items():
+        x, y = np.meshgrid(np.linspace(*drawn.x, 50), np.linspace(*drawn.y, 50))
+        targets = np.column_stack([x.ravel(), y.ravel()])
+        if not (geometry.inverse(targets, np.zeros_like(targets)).status == REACHED).any():
+            raise ParameterError(
+                f"params.yaml: elastic_arm.conditions.{name}.x: the rigid arm reaches nothing of "
+                "the area of x and y"
+            )

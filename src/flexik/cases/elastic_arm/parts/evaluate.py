@@ -77,7 +77,7 @@ def prepare(
     if network is not None and files is not None:
         found = list(restarts(method.network or "", network, files))
     function = functools.partial(errors, machine, method, build, conditions, deformation)
-    return Work(function, found, functools.partial(_tables, columns(flexible_arm(machine)), found))
+    return Work(function, found, functools.partial(written, columns(flexible_arm(machine)), found))
 
 
 def errors(
@@ -122,9 +122,10 @@ def columns(arm: FlexibleArm) -> Columns:
     return Columns(QUERY, FIELDS[:2], TIP_ERRORS, lower, upper)
 
 
-def _tables(
+def written(
     columns: Columns, trained: Sequence[Trained | None], results: Sequence[Mapping[str, NDArray]]
 ) -> dict[str, Writer]:
+    """Table of the chosen start, and mean and largest errors of all."""
     kept = next(k for k, network in enumerate(trained) if network is None or network.is_chosen)
     fields = fields_of(results[kept], columns)
     writers = {".parquet": table(results[kept], fields)}

@@ -19,9 +19,9 @@ PAYLOAD_ERROR_FIELDS = (
 
 def parts(section: Section) -> list[Part]:
     """One part a study."""
+    conditions = next(iter(section.conditions))
     told = {
         label: evaluate.described(section, conditions, label)
-        for conditions in section.conditions
         for label, method in section.methods.items()
         if method.needs and not isinstance(method, Gauge)
     }
