@@ -6,31 +6,49 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from flexik.datasets.tables import Field
 from flexik.errors import DataError, ParameterError
-from flexik.evaluation.conditions import all_conditions, random_conditions
+from flexik.evaluation.conditions import Conditions, every
 from flexik.evaluation.errors import (
     STATISTICS,
+    TIP_ERRORS,
+    check,
     comparison,
     evaluate,
+    fields_of,
     statistics,
     statistics_without,
+    tip_judge,
     workspace_statistics,
     worst_points,
 )
-from flexik.positioning.method import NOT_CONVERGED, REACHED, Command, PositioningError
+from flexik.kinematics.status import NOT_CONVERGED, REACHED
+from flexik.positioning.method import Answer, Columns, PositioningError
 
 PUBLISHED = Path(__file__).parents[1] / "data/reference/crane/positioning_errors.csv"
 
 
+COLUMNS = Columns(
+    query=tuple(
+        Field(n, u, n) for n, u in (("target_x", "m"), ("target_y", "m"), ("payload", "kg"))
+    ),
+    answer=tuple(Field(name, "m", name) for name in ("lift", "jib", "extension")),
+    errors=TIP_ERRORS,
+    lower=(0.0, 0.0, 0.0),
+    upper=(9.0, 9.0, 900.0),
+)
+
+
 def two_conditions():
-    return all_conditions([[1.0, 2.0], [4.0, 1.0]], [30.0])
+    query, group = every([[1.0, 2.0], [4.0, 1.0]], [30.0])
+    return Conditions(query, np.zeros((2, 3)), group)
 
 
-def method(targets, payload, initial_strokes):
-    """Command strokes whose fake tip is (3, 4) mm and (-12, 0) mm short; the second row fails."""
-    strokes = np.column_stack([targets, payload])
+def method(query, current):
+    """Answers whose fake tip is (3, 4) mm and (-12, 0) mm short; the second row fails."""
+    assert current.shape == query.shape
     status = np.array([REACHED, NOT_CONVERGED])
-    return Command(strokes, status, {"n_generations": np.array([7, 1000])})
+    return Answer(query, status, {"n_generations": np.array([7, 1000]), "residual": np.ones(2)})
 
 
 def flexible_tip(strokes, payload):
@@ -38,12 +56,16 @@ def flexible_tip(strokes, payload):
     return strokes[:, :2] - [[0.003, 0.004], [-0.012, 0.0]]
 
 
+def evaluated():
+    return evaluate(method, two_conditions(), tip_judge(flexible_tip), COLUMNS)
+
+
 def test_conditions_are_point_major(points, payloads):
-    conditions = all_conditions(points, payloads)
-    assert len(conditions) == 125
-    assert conditions.payload[:6].tolist() == [30, 120, 260, 310, 470, 30]
-    assert conditions.point_index.tolist() == [i // 5 for i in range(125)]
-    assert np.array_equal(conditions.targets, points[conditions.point_index])
+    query, group = every(points, payloads)
+    assert query.shape == (125, 3)
+    assert query[:6, 2].tolist() == [30, 120, 260, 310, 470, 30]
+    assert group.tolist() == [i // 5 for i in range(125)]
+    assert np.array_equal(query[:, :2], points[group])
 
 
 @pytest.mark.parametrize(
@@ -52,46 +74,65 @@ def test_conditions_are_point_major(points, payloads):
 )
 def test_bad_conditions_are_told(points, payloads):
     with pytest.raises(ParameterError, match="payloads"):
-        all_conditions(points, payloads)
+        every(points, payloads)
 
 
-def test_random_conditions_are_points_of_their_own():
-    targets, payload = [[1.0, 2.0], [1.0, 2.0], [4.0, 1.0]], [30.0, 470.0, 30.0]
-    conditions = random_conditions(pd.DataFrame(targets, index=[7, 3, 1]), pd.Series(payload))
-    assert len(conditions) == 3
-    assert conditions.targets.tolist() == targets
-    assert conditions.payload.tolist() == payload
-    assert conditions.point_index.tolist() == [0, 1, 2]
-    assert conditions.point_index.dtype == np.int64
-    assert len(random_conditions(np.empty((0, 2)), np.empty(0))) == 0
-
-
-@pytest.mark.parametrize(
-    ("targets", "payload"),
-    [([[1.0, 2.0]], [30.0, 50.0]), ([[1.0, 2.0, 3.0]], [30.0]), ([1.0, 2.0], [30.0, 50.0])],
-)
-def test_random_conditions_of_other_lengths_are_told(targets, payload):
-    with pytest.raises(ParameterError, match=r"targets\.shape=.*expected \(m, 2\) and \(m,\)"):
-        random_conditions(targets, payload)
+def test_conditions_in_pieces_are_whole_rows_in_order(points, payloads):
+    query, group = every(points, payloads)
+    conditions = Conditions(query, np.arange(250.0).reshape(125, 2), group)
+    pieces = conditions.chunks(40)
+    assert [len(piece) for piece in pieces] == [40, 40, 40, 5]
+    for name in ("query", "current", "group"):
+        together = np.concatenate([getattr(piece, name) for piece in pieces])
+        assert np.array_equal(together, getattr(conditions, name))
+    with pytest.raises(ParameterError, match=r"self\.current\.shape=\(3, 2\)"):
+        Conditions(query, conditions.current[:3], group)
 
 
 def test_errors_are_desired_minus_achieved_and_failures_stay():
-    frame = evaluate(method, two_conditions(), np.zeros((2, 3)), flexible_tip)
-    assert frame.columns.tolist() == [
-        *("point", "target_x", "target_y", "payload"),
-        *("lift_stroke", "jib_stroke", "extension_stroke"),
-        *("achieved_x", "achieved_y", "error_x", "error_y", "error", "status", "n_generations"),
+    table = evaluated()
+    assert list(table) == [
+        *("point", "target_x", "target_y", "payload", "lift", "jib", "extension"),
+        *("achieved_x", "achieved_y", "error_x", "error_y", "error", "status"),
+        *("n_generations", "residual"),
     ]
-    assert frame["error_x"].tolist() == pytest.approx([0.003, -0.012])
-    assert frame["error_y"].tolist() == pytest.approx([0.004, 0.0])
-    assert frame["error"].tolist() == pytest.approx([0.005, 0.012])
-    assert frame["status"].tolist() == [REACHED, NOT_CONVERGED]
-    assert frame["point"].tolist() == [0, 1]
-    assert frame["n_generations"].tolist() == [7, 1000]
+    assert table["error_x"].tolist() == pytest.approx([0.003, -0.012])
+    assert table["error_y"].tolist() == pytest.approx([0.004, 0.0])
+    assert table["error"].tolist() == pytest.approx([0.005, 0.012])
+    assert table["status"].tolist() == [REACHED, NOT_CONVERGED]
+    assert table["point"].tolist() == [0, 1]
+    assert table["n_generations"].tolist() == [7, 1000]
+    fields = fields_of(table, COLUMNS)
+    assert [field.name for field in fields] == list(table)
+    assert [(f.unit, f.dtype) for f in fields[-2:]] == [("1", "int64"), ("m", "float64")]
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "message"),
+    [
+        ("payload", np.nan, "query not finite in row 0"),
+        ("status", 17, "status unknown in row 0"),
+        ("lift", np.nan, "answer not finite in row 0"),
+        ("lift", 9.1, "answer beyond its limits in row 0"),
+        ("jib", -0.1, "answer beyond its limits in row 0"),
+        ("error", np.nan, "error negative or not finite in row 0"),
+        ("error", -1.0, "error negative or not finite in row 0"),
+    ],
+)
+def test_a_long_table_is_checked(column, value, message):
+    frame = pd.DataFrame(evaluated())
+    check(frame, COLUMNS)
+    wrong = frame.assign(**{column: [value, frame[column][1]]})
+    with pytest.raises(DataError, match=message):
+        check(wrong, COLUMNS)
+    if message.startswith(("answer", "error")):  # where a method failed there may be none
+        check(frame.assign(**{column: [frame[column][0], value]}), COLUMNS)
+    with pytest.raises(DataError, match=f"expected columns .'{column}'. too"):
+        check(frame.drop(columns=column), COLUMNS)
 
 
 def test_statistics_by_hand():
-    frame = evaluate(method, two_conditions(), np.zeros((2, 3)), flexible_tip)
+    frame = pd.DataFrame(evaluated())
     assert statistics(frame) == pytest.approx(
         {
             "max_abs_dx": 0.012,
@@ -182,19 +223,15 @@ def test_points_that_cannot_be_left_out_are_told():
 
 
 def test_misfits_are_told():
-    conditions = two_conditions()
-    with pytest.raises(PositioningError, match="initial strokes: expected shape"):
-        evaluate(method, conditions, np.zeros((1, 3)), flexible_tip)
+    conditions, still = two_conditions(), tip_judge(lambda values, payload: values[:, :2])
     with pytest.raises(PositioningError, match="achieved tip: sample 1 is not finite"):
-        evaluate(
-            method, conditions, np.zeros((2, 3)), lambda *_: np.array([[0.0, 0.0], [0.0, np.nan]])
-        )
+        evaluate(method, conditions, tip_judge(lambda *_: np.array([[0, 0], [0, np.nan]])), COLUMNS)
 
-    def clash(targets, payload, initial_strokes):
-        return Command(initial_strokes, np.zeros(2, dtype=np.int64), {"error": np.zeros(2)})
+    def clash(query, current):
+        return Answer(current, np.zeros(2, dtype=np.int64), {"error": np.zeros(2)})
 
     with pytest.raises(DataError, match="'error'"):
-        evaluate(clash, conditions, np.zeros((2, 3)), lambda *_: np.zeros((2, 2)))
+        evaluate(clash, conditions, still, COLUMNS)
 
 
 def test_published_errors_are_consistent():

@@ -2,6 +2,7 @@
 
 import functools
 
+import crane_case
 import numpy as np
 import pytest
 from hypothesis import given
@@ -15,13 +16,11 @@ from flexik.evaluation.targets import (
     solve_targets,
 )
 from flexik.kinematics.crane import forward
+from flexik.kinematics.crane_manipulator import CraneManipulator
+from flexik.kinematics.manipulator import RigidSolution
 from flexik.kinematics.status import ACTUATOR_LIMIT
-from flexik.multibody.crane.assembly import flexible_crane
 from flexik.multibody.crane.model import solve, tips
-from flexik.parameters import load_parameters
-from flexik.positioning.crane.closed_form import closed_form
 from flexik.positioning.method import PositioningError
-from flexik.positioning.rigid_inverse import RigidSolution
 
 LOWER, UPPER, PAYLOAD = (0.0, -4.5), (6.5, 8.0), (30.0, 500.0)
 
@@ -30,18 +29,21 @@ def candidates(n, seed=1):
     return draw_candidates(n, LOWER, UPPER, PAYLOAD, np.random.default_rng(seed))
 
 
-# A gantry: the strokes are the coordinates of the rigid tip, in a square of one metre
+class Gantry:
+    """The first two coordinates are those of the rigid tip, in a square of one metre."""
 
+    lower, upper = np.zeros(3), np.ones(3)
 
-def gantry_tip(strokes):
-    return strokes[:, :2]
+    def forward(self, values):
+        """Tip."""
+        return values[:, :2]
 
-
-def gantry_inverse(targets, current_strokes, original_targets=None):
-    inside = ((targets >= 0.0) & (targets <= 1.0)).all(axis=1)
-    strokes = np.column_stack([targets, np.zeros(len(targets))])
-    strokes = np.where(inside[:, None], strokes, current_strokes)
-    return RigidSolution(strokes, np.where(inside, 0, ACTUATOR_LIMIT), {})
+    def inverse(self, targets, current, original_targets=None):
+        """Coordinates."""
+        inside = ((targets >= 0.0) & (targets <= 1.0)).all(axis=1)
+        values = np.column_stack([targets, np.zeros(len(targets))])
+        values = np.where(inside[:, None], values, current)
+        return RigidSolution(values, np.where(inside, 0, ACTUATOR_LIMIT), {})
 
 
 def growing(share, strokes, payload):
@@ -50,9 +52,7 @@ def growing(share, strokes, payload):
 
 
 def solve_gantry(targets, payload, flexible_tip, **limits):
-    return solve_targets(
-        np.array(targets), np.array(payload), gantry_inverse, gantry_tip, flexible_tip, **limits
-    )
+    return solve_targets(np.array(targets), np.array(payload), Gantry(), flexible_tip, **limits)
 
 
 @pytest.mark.parametrize("n_iterations", [1, 2, 3, 4])
@@ -64,7 +64,7 @@ def test_each_pass_shrinks_the_residual_as_the_series_does(n_iterations):
     assert found.residual == pytest.approx([0.5 * c**n_iterations])
     assert not found.reached[0]
     terms = (-c) ** np.arange(n_iterations)
-    assert found.strokes[0] == pytest.approx([0.3 * terms.sum(), 0.4 * terms.sum(), 0.0])
+    assert found.values[0] == pytest.approx([0.3 * terms.sum(), 0.4 * terms.sum(), 0.0])
 
 
 def test_iteration_ends_below_the_tolerance():
@@ -72,7 +72,7 @@ def test_iteration_ends_below_the_tolerance():
     found = solve_gantry(target, [1.0], flexible_tip, tolerance=1e-4, n_iterations=20)
     assert found.reached[0]
     assert found.residual == pytest.approx([0.5e-4])
-    assert solve_gantry(target, [1.0], flexible_tip, n_iterations=20).strokes[0] == pytest.approx(
+    assert solve_gantry(target, [1.0], flexible_tip, n_iterations=20).values[0] == pytest.approx(
         [0.3 / 1.1, 0.4 / 1.1, 0.0], abs=1e-6
     )
 
@@ -102,12 +102,13 @@ def test_each_kind_of_failure():
 def test_every_pass_tells_the_inverse_the_targets_and_the_last_strokes():
     asked = []
 
-    def inverse(*arrays):
-        asked.append(arrays)
-        return gantry_inverse(*arrays)
+    class Spy(Gantry):
+        def inverse(self, *arrays):
+            asked.append(arrays)
+            return super().inverse(*arrays)
 
     target, flexible_tip = np.array([[0.3, 0.4]]), functools.partial(growing, 0.1)
-    solve_targets(target, np.ones(1), inverse, gantry_tip, flexible_tip, n_iterations=2)
+    solve_targets(target, np.ones(1), Spy(), flexible_tip, n_iterations=2)
     (first, _, original), (second, strokes, original_again) = asked
     assert first.tolist() == original.tolist() == original_again.tolist() == target.tolist()
     assert second == pytest.approx(0.9 * target)
@@ -129,28 +130,24 @@ def sagging_tip(geometry, strokes, payload):
 def test_strokes_put_the_loaded_tip_on_the_targets(geometry):
     targets, payload = candidates(2000)
     flexible_tip = functools.partial(sagging_tip, geometry)
-    inverse, rigid_tip = closed_form(geometry), functools.partial(forward, geometry)
-    found = solve_targets(targets, payload, inverse, rigid_tip, flexible_tip)
-    distance = np.linalg.norm(flexible_tip(found.strokes, payload) - targets, axis=1)
+    manipulator = CraneManipulator(geometry)
+    found = solve_targets(targets, payload, manipulator, flexible_tip)
+    distance = np.linalg.norm(flexible_tip(found.values, payload) - targets, axis=1)
     assert (distance[found.reached] < 1e-6).all()
     assert distance[found.reached] == pytest.approx(found.residual[found.reached], abs=1e-12)
-    assert (found.strokes >= 0.0).all()
-    assert (found.strokes <= geometry.stroke_maximum).all()
+    assert (found.values >= 0.0).all()
+    assert (found.values <= geometry.stroke_maximum).all()
     assert 0.5 < found.reached.mean() < 1.0
     # an uncompensated command is far off
-    rigid = inverse(targets, np.zeros((2000, 3)))
+    rigid = manipulator.inverse(targets, np.zeros((2000, 3)))
     assert rigid.status[found.reached].max() == 0
-    off = np.linalg.norm(flexible_tip(rigid.strokes, payload) - targets, axis=1)
+    off = np.linalg.norm(flexible_tip(rigid.values, payload) - targets, axis=1)
     assert np.median(off[found.reached]) > 0.01
 
 
 def test_rows_do_not_depend_on_their_neighbours(geometry):
     targets, payload = candidates(100)
-    others = (
-        closed_form(geometry),
-        functools.partial(forward, geometry),
-        functools.partial(sagging_tip, geometry),
-    )
+    others = CraneManipulator(geometry), functools.partial(sagging_tip, geometry)
     whole = solve_targets(targets, payload, *others)
     for n in (1, 7, 50):
         cuts = [slice(k, k + n) for k in range(0, len(targets), n)]
@@ -163,36 +160,31 @@ def test_rows_do_not_depend_on_their_neighbours(geometry):
 
 def test_reachable_targets_are_those_reached_in_order(geometry):
     targets, payload = candidates(100)
-    others = (
-        closed_form(geometry),
-        functools.partial(forward, geometry),
-        functools.partial(sagging_tip, geometry),
-    )
+    others = CraneManipulator(geometry), functools.partial(sagging_tip, geometry)
     strokes, reached, _ = solve_targets(targets, payload, *others)
     found = reachable_targets(targets, payload, *others)
     assert len(found) == reached.sum() > 0
     assert np.array_equal(found.targets, targets[reached])
     assert np.array_equal(found.payload, payload[reached])
-    assert np.array_equal(found.strokes, strokes[reached])
+    assert np.array_equal(found.values, strokes[reached])
 
 
 def test_the_flexible_crane_reaches_its_targets():
-    model = flexible_crane(load_parameters().crane, 8e6)
+    model = crane_case.crane()
     targets, payload = candidates(30, seed=2)
     found = reachable_targets(
         targets,
         payload,
-        closed_form(model.geometry),
-        functools.partial(forward, model.geometry),
+        CraneManipulator(model.geometry),
         lambda strokes, mass: solve(model, strokes, mass)[0],
     )
     assert 15 <= len(found) <= 30
     # alone, in another order
     order = np.random.default_rng(0).permutation(len(found))
-    tip = tips(model, found.strokes[order], found.payload[order])
+    tip = tips(model, found.values[order], found.payload[order])
     assert np.linalg.norm(tip - found.targets[order], axis=1).max() < 1e-6
     # the strokes of the rigid crane are not these
-    off = forward(model.geometry, found.strokes) - found.targets
+    off = forward(model.geometry, found.values) - found.targets
     assert np.linalg.norm(off, axis=1).max() > 0.01
 
 
@@ -238,5 +230,5 @@ def test_misfits_are_told():
         draw_candidates(3, LOWER, (1.0, 2.0, 3.0), PAYLOAD, np.random.default_rng(0))
     with pytest.raises(PositioningError, match="payload: expected shape"):
         solve_gantry([[0.1, 0.2]], [1.0, 2.0], functools.partial(growing, 0.1))
-    with pytest.raises(PositioningError, match="strokes: expected shape"):
+    with pytest.raises(PositioningError, match="values: expected shape"):
         Targets(np.zeros((2, 2)), np.zeros(2), np.zeros((1, 3)))

@@ -2,16 +2,15 @@
 
 from dataclasses import replace
 
+import crane_case
 import numpy as np
 import pytest
 import virtual_work
 
-from flexik.datasets.crane.grid import random_samples
+from flexik.cases.crane.parts.samples import random_samples
 from flexik.errors import SolverError
 from flexik.kinematics.crane import forward
-from flexik.multibody.crane.assembly import flexible_crane
 from flexik.multibody.crane.model import CraneModel, equilibrium, reference_shapes, solve, tips
-from flexik.parameters import load_parameters
 
 SPRING = 8e6  # N m/rad
 RODS = ("lift_cylinder", "jib_cylinder", "rocker", "coupler", "front_pad")
@@ -19,7 +18,7 @@ RODS = ("lift_cylinder", "jib_cylinder", "rocker", "coupler", "front_pad")
 
 @pytest.fixture(scope="module")
 def crane():
-    return flexible_crane(load_parameters().crane, SPRING)
+    return crane_case.crane(SPRING)
 
 
 @pytest.fixture(scope="module")

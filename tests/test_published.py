@@ -3,14 +3,13 @@
 import json
 from pathlib import Path
 
+import crane_case
 import numpy as np
 import pandas as pd
 import pytest
 
 from flexik.kinematics.crane import inverse_with_smallest_extension
-from flexik.multibody.crane.assembly import flexible_crane
 from flexik.multibody.crane.model import tips
-from flexik.parameters import load_parameters
 
 ROOT = Path(__file__).resolve().parents[1]
 CALIBRATED = 8.45488e6  # N m/rad, reports/crane/metrics.json
@@ -48,8 +47,7 @@ def test_largest_published_error_is_that_of_a_point_beside_ours(published):
 
     Our points (6, 1) and (6, 3) have 5 and 48 mm; between them, at (6, 2), the model has it all.
     """
-    crane = load_parameters().crane
-    model = flexible_crane(crane, CALIBRATED)
+    model = crane_case.crane(CALIBRATED)
     target = np.array([[6.0, 2.0]])
     strokes = inverse_with_smallest_extension(model.geometry, target).strokes
     x, y = 1e3 * np.abs(target - tips(model, strokes, np.array([470.0])))[0]

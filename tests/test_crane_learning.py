@@ -1,32 +1,28 @@
 """What each kind of network learns, on a table made by hand."""
 
-from pathlib import Path
-
+import crane_case
 import numpy as np
 import pandas as pd
 import pytest
 
-from flexik.datasets.crane.grid import FAILED, FIELDS, KEPT, LEFT_OUT
-from flexik.datasets.crane.learning import (
+from flexik.cases.crane.parts.fields import FAILED, KEPT, LEFT_OUT, SAMPLE_FIELDS, on_line
+from flexik.cases.crane.parts.learning import (
     KINDS,
     correction,
     learnt_rows,
+    lesson,
     on_branch,
-    on_line,
-    read_learning_data,
     stroke_error_at_tip,
 )
-from flexik.datasets.crane.provenance import grid_checksum, selection_checksum
 from flexik.datasets.tables import write_table
-from flexik.errors import DataError
 from flexik.kinematics.crane import forward, inverse
-from flexik.parameters import load_parameters
+from flexik.learning.training import Architecture
+from flexik.parameters.trainers import LevenbergMarquardt
 
-ROOT = Path(__file__).parents[1]
-SPRING = 8e6  # N m/rad
 # Lift, jib, extension (m), payload (kg), deflection x, y (m), status
 ROWS = np.array(
     [
+        [0.2, 0.5, 0.4, 100.0, -0.002, -0.015, KEPT],
         [0.3, 0.4, 0.8, 50.0, -0.001, -0.010, KEPT],
         [0.3, 0.4, 0.8, 200.0, -0.004, -0.040, KEPT],
         [0.3, 0.4, 0.8, 500.0, np.nan, np.nan, FAILED],
@@ -38,7 +34,7 @@ ROWS = np.array(
     ]
 )
 USED = ROWS[ROWS[:, 6] == KEPT]
-INVERTIBLE = USED[[0, 1, 3, 5]]
+INVERTIBLE = USED[[0, 1, 2, 4, 6]]
 
 
 class Linear:
@@ -54,26 +50,31 @@ class Linear:
 def table_of(rows, geometry):
     rigid = forward(geometry, rows[:, :3])
     columns = [*rows[:, :4].T, *rigid.T, *(rigid + rows[:, 4:6]).T, rows[:, 6].astype(np.int64)]
-    return pd.DataFrame(dict(zip((field.name for field in FIELDS), columns, strict=True)))
+    return pd.DataFrame(dict(zip((field.name for field in SAMPLE_FIELDS), columns, strict=True)))
 
 
-@pytest.fixture
-def crane(monkeypatch):
-    monkeypatch.chdir(ROOT)  # sections are named relative to the project
-    return load_parameters().crane
-
-
-@pytest.fixture
-def folder(crane, geometry, tmp_path):
-    """Grid of all rows, selection of the last two."""
-    for name, rows, made_with in (
-        ("grid", ROWS, grid_checksum(crane, SPRING)),
-        ("selection", ROWS[-2:], selection_checksum(crane, SPRING)),
-    ):
+@pytest.fixture(scope="module")
+def learn(geometry, tmp_path_factory):
+    """Lesson of a kind: grid of all rows, selection of the last two."""
+    folder = tmp_path_factory.mktemp("samples")
+    for name, rows in (("grid", ROWS), ("selection", ROWS[-2:])):
         table = table_of(rows, geometry)
-        columns = {field.name: table[field.name].to_numpy() for field in FIELDS}
-        write_table(tmp_path / f"{name}.parquet", columns, FIELDS, made_with)
-    return tmp_path
+        columns = {field.name: table[field.name].to_numpy() for field in SAMPLE_FIELDS}
+        write_table(folder / f"{name}.parquet", columns, SAMPLE_FIELDS)
+
+    def of(kind):
+        return lesson(
+            kind,
+            Architecture(1),
+            LevenbergMarquardt(),
+            7,
+            geometry,
+            folder / "grid.parquet",
+            folder / "selection.parquet",
+            Linear() if kind == "correction" else None,
+        )
+
+    return of
 
 
 def expected(kind, rows, geometry):
@@ -83,31 +84,35 @@ def expected(kind, rows, geometry):
     loaded = np.hstack([strokes, payload])
     return {
         "deflection": (loaded, bent),
-        "direct": (loaded, rigid + bent),
-        "rigid": (strokes, rigid),
+        "tip": (loaded, rigid + bent),
+        "rigid_tip": (strokes, rigid),
         "correction": (loaded, rigid + bent - strokes @ Linear.MATRIX),
-        "inverse": (np.hstack([rigid + bent, payload, strokes[:, 2:]]), strokes[:, :2]),
+        "coordinates": (np.hstack([rigid + bent, payload, strokes[:, 2:]]), strokes[:, :2]),
     }[kind]
 
 
 LEARNT = {
     "deflection": (USED, ROWS[-2:]),
-    "direct": (USED, ROWS[-2:]),
-    "rigid": (USED[[0, 2, 3, 4, 5]], ROWS[-2:]),  # each pose once
+    "tip": (USED, ROWS[-2:]),
+    "rigid_tip": (USED[[0, 1, 3, 4, 5, 6]], ROWS[-2:]),  # each pose once
     "correction": (USED, ROWS[-2:]),
-    "inverse": (INVERTIBLE, ROWS[-1:]),
+    "coordinates": (INVERTIBLE, ROWS[-1:]),
 }
 
 
 @pytest.mark.parametrize("kind", LEARNT)
-def test_each_kind_has_its_inputs_and_outputs(crane, folder, geometry, kind):
-    rigid = Linear() if kind == "correction" else None
-    data = read_learning_data(folder, crane, SPRING, kind, rigid)
+def test_each_kind_has_its_inputs_and_outputs(learn, geometry, kind):
+    found = learn(kind)
     training, selection = (expected(kind, rows, geometry) for rows in LEARNT[kind])
-    assert data.inputs == pytest.approx(training[0], abs=1e-15)
-    assert data.outputs == pytest.approx(training[1], abs=1e-15)
-    assert data.selection_inputs == pytest.approx(selection[0], abs=1e-15)
-    assert data.selection_outputs == pytest.approx(selection[1], abs=1e-15)
+    assert found.inputs == pytest.approx(training[0], abs=1e-15)
+    assert found.outputs == pytest.approx(training[1], abs=1e-15)
+    assert found.selection[0] == pytest.approx(selection[0], abs=1e-15)
+    assert found.selection[1] == pytest.approx(selection[1], abs=1e-15)
+    for quantities, fields in (
+        (found.input_quantities, KINDS[kind].inputs),
+        (found.output_quantities, KINDS[kind].outputs),
+    ):
+        assert [(q.name, q.unit) for q in quantities] == [(f.name, f.unit) for f in fields]
 
 
 class Strokes:
@@ -121,11 +126,10 @@ class Strokes:
         return np.broadcast_to(self.strokes, (len(values), 2))
 
 
-def test_inverse_networks_are_judged_by_the_tip(crane, folder, geometry):
-    for kind in set(LEARNT) - {"inverse"}:
-        rigid = Linear() if kind == "correction" else None
-        assert read_learning_data(folder, crane, SPRING, kind, rigid).judge is None
-    data = read_learning_data(folder, crane, SPRING, "inverse")
+def test_inverse_networks_are_judged_by_the_tip(learn, geometry):
+    for kind in set(LEARNT) - {"coordinates"}:
+        assert learn(kind).judge is None
+    data = learn("coordinates")
     lift, jib, extension = ROWS[-1, :3]  # the one row of the selection
     assert data.judge(Strokes([lift, jib])) == 0.0
     tips = forward(geometry, USED[:, :3]) + USED[:, 4:6]
@@ -151,9 +155,10 @@ def test_the_error_at_the_tip_is_a_mean_over_samples_and_axes(geometry):
     assert error == pytest.approx(np.sqrt(squares.sum() / 4), rel=1e-12)
 
 
-def test_all_kinds_are_tested_and_name_their_columns(crane):
+def test_all_kinds_are_tested_and_name_their_columns():
     assert KINDS.keys() == LEARNT.keys()
-    assert {network.kind for network in crane.all_networks.values()} == set(KINDS)
+    networks = crane_case.section().networks.values()
+    assert {network.learns or "correction" for network in networks} == set(KINDS)
     strokes = ["lift_stroke", "jib_stroke", "extension_stroke"]
     names = {
         kind: [[field.name for field in fields] for fields in (columns.inputs, columns.outputs)]
@@ -161,10 +166,10 @@ def test_all_kinds_are_tested_and_name_their_columns(crane):
     }
     assert names == {
         "deflection": [[*strokes, "payload"], ["deflection_x", "deflection_y"]],
-        "direct": [[*strokes, "payload"], ["tip_x", "tip_y"]],
-        "rigid": [strokes, ["rigid_x", "rigid_y"]],
+        "tip": [[*strokes, "payload"], ["tip_x", "tip_y"]],
+        "rigid_tip": [strokes, ["rigid_x", "rigid_y"]],
         "correction": [[*strokes, "payload"], ["correction_x", "correction_y"]],
-        "inverse": [["tip_x", "tip_y", "payload", "extension_stroke"], strokes[:2]],
+        "coordinates": [["tip_x", "tip_y", "payload", "extension_stroke"], strokes[:2]],
     }
     for columns in KINDS.values():
         for field in (*columns.inputs, *columns.outputs):
@@ -174,7 +179,7 @@ def test_all_kinds_are_tested_and_name_their_columns(crane):
 def test_poses_on_the_branch_are_those_the_rigid_inverse_takes(geometry):
     table = table_of(ROWS, geometry)
     found = on_branch(table, geometry)
-    assert found.tolist() == [True, True, True, False, True, True, False, True]
+    assert found.tolist() == [True, True, True, True, False, True, True, False, True]
     # those that are not have a tip that other strokes have too
     for strokes in table.loc[~found, ["lift_stroke", "jib_stroke", "extension_stroke"]].to_numpy():
         tip = forward(geometry, strokes[None])
@@ -203,17 +208,11 @@ def test_a_correction_is_what_the_network_lacks_of_the_tip(geometry):
 
 def test_rows_on_a_line_have_its_strokes_and_payload(geometry):
     table = table_of(ROWS, geometry)
-    assert on_line(table, 0.4, 0.8).tolist() == [True] * 3 + [False] * 5
-    assert on_line(table, 0.4, 0.8, 200.0).tolist() == [False, True] + [False] * 6
-    assert on_line(table, 0.4, 1.6).nonzero()[0].tolist() == [7]
+    assert on_line(table, 0.4, 0.8).tolist() == [False] + [True] * 3 + [False] * 5
+    assert on_line(table, 0.4, 0.8, 200.0).tolist() == [False, False, True] + [False] * 6
+    assert on_line(table, 0.4, 1.6).nonzero()[0].tolist() == [8]
     # as sums of increments differ from a written value
-    assert on_line(table, 0.1 + 0.3, 0.8000000000000002).tolist() == [True] * 3 + [False] * 5
+    assert (
+        on_line(table, 0.1 + 0.3, 0.8000000000000002).tolist() == on_line(table, 0.4, 0.8).tolist()
+    )
     assert not on_line(table, 0.41, 0.8).any()
-
-
-def test_tables_of_other_parameters_are_refused(crane, folder):
-    with pytest.raises(DataError, match=r"grid\.parquet: made with other parameters"):
-        read_learning_data(folder, crane, 2 * SPRING, "direct")
-    other = crane.selection.model_copy(update={"seed": crane.selection.seed + 1})
-    with pytest.raises(DataError, match=r"selection\.parquet: made with other parameters"):
-        read_learning_data(folder, crane.model_copy(update={"selection": other}), SPRING, "direct")

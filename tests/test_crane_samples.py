@@ -1,56 +1,51 @@
 """Grid and random samples of the crane, and their statuses."""
 
-import functools
-from pathlib import Path
+import contextlib
+import shutil
 
+import crane_case
 import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flexik.datasets.crane.grid import (
+from flexik.cases.crane.parts import samples as module
+from flexik.cases.crane.parts import targets
+from flexik.cases.crane.parts.crane import sorted_tips
+from flexik.cases.crane.parts.fields import (
     FAILED,
-    FIELDS,
     INPUTS,
     KEPT,
     LEFT_OUT,
+    SAMPLE_FIELDS,
+    TARGET_FIELDS,
+    deflection,
+    kept,
+)
+from flexik.cases.crane.parts.samples import (
     POSES_PER_PART,
     GridParts,
     Samples,
     axis,
     counts,
-    deflection,
     failed_samples,
-    generate,
-    kept,
-    parallel_tips,
     random_samples,
     solve_samples,
     split,
 )
 from flexik.datasets.parallel import ParallelSettings
+from flexik.datasets.parts import make
 from flexik.datasets.tables import read_table
-from flexik.errors import ParameterError, SolverError
+from flexik.errors import FlexikError, ParameterError, SolverError
+from flexik.files import write_json
 from flexik.kinematics.crane import forward
-from flexik.multibody.crane.assembly import flexible_crane
 from flexik.multibody.crane.model import tips
-from flexik.parameters import load_parameters
-
-ROOT = Path(__file__).parents[1]
-SPRING = 8e6  # N m/rad
 
 
 @pytest.fixture(scope="module")
-def parameters():
-    return load_parameters(ROOT / "params.yaml")
-
-
-@pytest.fixture(scope="module")
-def crane(parameters):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(ROOT)  # sections are named relative to the project
-        return flexible_crane(parameters.crane, SPRING)
+def crane():
+    return crane_case.crane()
 
 
 @pytest.mark.parametrize(
@@ -105,12 +100,12 @@ def test_a_grid_too_large_for_memory_is_cheap_until_asked_for():
     assert last.payload[-1] == 1
 
 
-def test_grid_of_the_thesis(geometry, parameters):
-    grid = parameters.crane.grid
-    parts = GridParts(**{n: axis(**getattr(grid, n).model_dump()) for n in GridParts.AXES})
+def test_grid_of_the_thesis(geometry):
+    grid = crane_case.section().samples.grid
+    parts = GridParts(**{n: axis(**dict(getattr(grid, n))) for n in GridParts.AXES})
     assert parts.n_samples == 4050
     tip = np.vstack([forward(geometry, part.strokes) for part in parts])
-    assert (tip[:, 0] >= grid.minimum_tip_x).sum() == 3670
+    assert (tip[:, 0] >= 0.0).sum() == 3670
 
 
 def test_random_samples_fill_their_ranges(geometry):
@@ -166,7 +161,7 @@ def mixed():
 
 def test_every_sample_is_a_row_with_its_status(crane, mixed):
     columns = solve_samples(crane, 0.0, mixed)
-    assert list(columns) == [field.name for field in FIELDS]
+    assert list(columns) == [field.name for field in SAMPLE_FIELDS]
     table = pd.DataFrame(columns)
     assert table["status"].tolist() == [KEPT, LEFT_OUT, FAILED, KEPT, KEPT]
     assert np.array_equal(table[list(INPUTS)], np.column_stack([mixed.strokes, mixed.payload]))
@@ -200,19 +195,6 @@ def test_no_failure_no_text():
     assert failed_samples(pd.DataFrame({name: [0.0] for name in INPUTS} | {"status": [0]})) == []
 
 
-def test_generated_tables_are_the_same_for_one_and_two_workers(crane, mixed, tmp_path):
-    parts = split(mixed, 2)
-    for n_workers in (1, 2):
-        path = tmp_path / str(n_workers) / "grid.parquet"
-        settings = ParallelSettings(n_workers)
-        assert generate(path, crane, parts, 0.0, "made with", "key", settings, "") == 0
-        assert [child.name for child in path.parent.iterdir()] == ["grid.parquet"]
-    first, second = ((tmp_path / n / "grid.parquet").read_bytes() for n in "12")
-    assert first == second
-    table = read_table(tmp_path / "1" / "grid.parquet", FIELDS, "made with")
-    assert table["status"].tolist() == [KEPT, LEFT_OUT, FAILED, KEPT, KEPT]
-
-
 @pytest.fixture(scope="module")
 def commanded(geometry):
     """Three extensions and one kept by chance, in no order, a sample twice."""
@@ -222,32 +204,113 @@ def commanded(geometry):
     return np.vstack([strokes, strokes[3:4]]), np.append(payload, payload[3])
 
 
-@pytest.mark.parametrize("n_workers", [1, 2])
-def test_parallel_tips_are_the_tips_in_their_order(crane, commanded, n_workers, monkeypatch):
-    monkeypatch.setattr("flexik.datasets.crane.grid.split", functools.partial(split, n_rows=3))
+def test_tips_of_one_extension_together_are_the_tips_in_their_order(crane, commanded):
     strokes, payload = commanded
-    found = parallel_tips(crane, strokes, payload, ParallelSettings(n_workers))
+    found = sorted_tips(crane, strokes, payload)
     alone = [tips(crane, strokes[[i]], payload[[i]])[0] for i in range(len(payload))]
     assert found == pytest.approx(np.array(alone), abs=2e-7)
-    assert np.array_equal(found[3], found[-1])
+    assert found[3] == pytest.approx(found[-1], abs=2e-7)
     order = np.random.default_rng(5).permutation(len(payload))
-    again = parallel_tips(crane, strokes[order], payload[order], ParallelSettings(n_workers))
-    assert np.array_equal(again, found[order])
-
-
-def test_parallel_tips_of_nothing_are_none(crane):
-    found = parallel_tips(crane, np.empty((0, 3)), np.empty(0), ParallelSettings(1))
-    assert found.shape == (0, 2)
-
-
-def test_parallel_tips_tell_a_row_without_equilibrium(crane, commanded):
-    strokes, payload = commanded
-    heavy = np.where(np.arange(len(payload)) == 2, 1e7, payload)
+    again = sorted_tips(crane, strokes[order], payload[order])
+    assert again == pytest.approx(found[order], abs=2e-7)
+    assert sorted_tips(crane, np.empty((0, 3)), np.empty(0)).shape == (0, 2)
     with pytest.raises(SolverError):
-        parallel_tips(crane, strokes, heavy, ParallelSettings(1))
+        sorted_tips(crane, strokes, np.where(np.arange(len(payload)) == 2, 1e7, payload))
 
 
 def test_strokes_that_do_not_assemble_fail_and_are_not_left_out(crane):
     samples = Samples(np.array([[0.1, 3.0, 1.0], [0.1, 0.1, 1.0]]), np.full(2, 100.0))
     columns = solve_samples(crane, 0.0, samples)
     assert columns["status"].tolist() == [FAILED, KEPT]
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """Folder with little more than a calibrated crane."""
+    shutil.copytree(crane_case.ROOT / "data/reference/crane", tmp_path / "data/reference/crane")
+    write_json(tmp_path / "data/crane/constants/spring.json", {"spring_stiffness": 8e6})
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def small(**changes):
+    """Section with a small grid, and few targets with `changes`."""
+    section = crane_case.section()
+    axes = {
+        name: getattr(section.samples.grid, name).model_copy(update={"increment": step})
+        for name, step in (("lift", 0.535), ("jib", 0.39), ("extension", 0.8), ("payload", 225.0))
+    }
+    grid = section.samples.grid.model_copy(update=axes)
+    selection = section.samples.selection.model_copy(update={"n_samples": 9})
+    samples = section.samples.model_copy(update={"grid": grid, "selection": selection})
+    random = section.conditions["workspace"].model_copy(update={"n_targets": 20, **changes})
+    conditions = {**section.conditions, "workspace": random}
+    return section.model_copy(update={"samples": samples, "conditions": conditions})
+
+
+def test_tables_do_not_depend_on_the_workers(project, monkeypatch):
+    monkeypatch.setattr(targets, "ROWS", 7)
+    section = small()
+    for folder, n_workers in (("one", 1), ("two", 2)):
+        parts = [*module.parts(section), *targets.parts(section)]
+        make(folder, parts, ParallelSettings(n_workers=n_workers))
+    for name in ("grid", "selection", "workspace"):
+        one, two = (project / folder / f"{name}.parquet" for folder in ("one", "two"))
+        assert one.read_bytes() == two.read_bytes()
+    grid = read_table(project / "one/grid.parquet", SAMPLE_FIELDS)
+    assert len(grid) == 2 * 3 * 3 * 3
+    assert set(grid["status"]) == {KEPT, LEFT_OUT}
+    table, random = read_table(project / "one/workspace.parquet"), section.conditions["workspace"]
+    assert len(table) == 20
+    for name, (least, most) in zip(
+        ("target_x", "target_y", "payload"), (random.x, random.y, random.payload), strict=True
+    ):
+        assert table[name].between(least, most).all()
+    assert (table["target_x"] >= section.samples.minimum_tip_x).all()
+    strokes = table[["lift_stroke", "jib_stroke", "extension_stroke"]].to_numpy()
+    assert (strokes >= 0).all() and (strokes <= section.machine.geometry.stroke_maximum).all()
+    tip = tips(crane_case.crane(), strokes, table["payload"].to_numpy())
+    off = np.linalg.norm(tip - table[["target_x", "target_y"]].to_numpy(), axis=1)
+    assert (off < 1.01 * random.tolerance).all()
+
+
+def drawn(section):
+    """Targets and payloads of set `workspace`."""
+    (part,) = targets.parts(section)
+    with contextlib.redirect_stdout(None):
+        work = part.prepare(**part.settings, spring=part.inputs["spring"], sections={})
+    results = [work.function(item) for item in work.items]
+    writers = work.finish(results)
+    writers[".parquet"]("targets.parquet")
+    names = [field.name for field in TARGET_FIELDS[:3]]
+    return read_table("targets.parquet")[names].to_numpy()
+
+
+def test_fewer_targets_are_the_first_of_more_and_another_seed_gives_others(project):
+    more = drawn(small())
+    assert np.array_equal(drawn(small(n_targets=6)), more[:6])
+    assert not np.isin(drawn(small(seed=22)), more).any()
+
+
+def test_targets_are_sought_on_where_the_first_do_not_do(project, monkeypatch):
+    all_at_once = drawn(small())
+    monkeypatch.setattr(targets, "TRIED", 0.3)
+    monkeypatch.setattr(targets, "ROWS", 4)
+    assert np.array_equal(drawn(small()), all_at_once)
+    with pytest.raises(ParameterError, match=r"crane.conditions.workspace: of 60 .* only 0 are"):
+        drawn(small(x=(9.0, 10.0), n_targets=3))
+
+
+def test_too_many_failures_are_an_error_that_names_the_first(project, monkeypatch):
+    heavy = {
+        "payload": small().samples.grid.payload.model_copy(
+            update={"maximum": 1e8, "increment": 1e8 - 50.0}
+        )
+    }
+    section = small()
+    grid = section.samples.grid.model_copy(update=heavy)
+    samples = section.samples.model_copy(update={"grid": grid, "maximum_failed_share": 0.1})
+    parts = module.parts(section.model_copy(update={"samples": samples}))[:1]
+    with pytest.raises(FlexikError, match=r"grid: .* of 36 samples failed.*0\.1; first: strokes"):
+        make("grid", parts, ParallelSettings(n_workers=1))
+    assert not (project / "grid/grid.parquet").exists()
