@@ -5,9 +5,10 @@
 Without an argument both. Needs `make repro` for data/smartee. Writes
 reports/benchmarks/smartee.csv (microseconds a pose, alone and in a batch, for every way to the
 elbows) and reports/benchmarks/smartee_training.csv (seconds a run of the study takes, and what
-runs of many times its iterations come to), each with a Markdown file. One core a process.
+runs of many times its iterations come to), each with a Markdown file. On one core.
 """
 
+# ruff: noqa: E402
 import os
 import statistics
 import sys
@@ -16,47 +17,32 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-import pandas as pd
-from threadpoolctl import threadpool_limits
-from training_race import pinned_pool
+from flexik import kernels
 
-from flexik import parameters, stage
-from flexik.datasets.smartee.poses import (
-    ACTUATED_FIELDS,
-    ELBOW_FIELDS,
-    geometry_of,
-    joints_in,
-    read_poses,
-    values,
-)
-from flexik.datasets.smartee.provenance import (
-    network_checksum,
-    query_checksum,
-    training_time_checksum,
-)
+kernels.fix()  # before NumPy is imported
+
+import pandas as pd
+
+from flexik import stage
+from flexik.cases.case import load
+from flexik.cases.smartee.parts.errors import conditions_of
+from flexik.cases.smartee.parts.methods import trained
+from flexik.cases.smartee.parts.poses import SAMPLES, centre_elbows
+from flexik.cases.smartee.parts.train import lesson
+from flexik.cases.smartee.section import PREVIOUS, RANDOM
+from flexik.datasets.tables import read_table
 from flexik.errors import DataError, FlexikError
-from flexik.learning.perceptron import quantities
-from flexik.learning.storage import load_network
-from flexik.learning.training import Architecture, train, trainer_settings
-from flexik.parameters import load_parameters
-from flexik.positioning.smartee.direct import (
-    Direct,
-    by_network,
-    centre_elbows,
-    from_centre,
-    solved_from_centre,
-)
+from flexik.evaluation.conditions import Conditions
+from flexik.learning.training import Architecture, train
+from flexik.positioning.method import Method
 from flexik.reporting.tables import markdown, write_table
 
-DATA = Path("data/smartee")
 OUTPUT = Path("reports/benchmarks")
 N_SINGLE = 300
 N_REPEATS = 5
 N_BATCHES = 15
 # Starts of a long run, and how many times the iterations of the study it has
 N_LONG, LONG = 4, 10
-SOLVED = -1  # n_steps of Newton's method until it converges
 
 
 def query() -> pd.DataFrame:
@@ -64,115 +50,102 @@ def query() -> pd.DataFrame:
 
     Newton steps from the previous pose cost what those from the centre cost.
     """
-    smartee = load_parameters().smartee
+    section = load("smartee")
+    labels = [
+        (name, n_steps)
+        for name, method in section.methods.items()
+        for n_steps in method.n_steps
+        if name != PREVIOUS
+    ]
     try:
-        methods = ways(smartee)
-        actuated = joints_in(read_poses(DATA / "poses", smartee, "random"))[..., :2]
+        methods = {label: trained(section, *label) for label in labels}
+        poses = read_table(SAMPLES / f"{RANDOM}.parquet")
     except DataError as error:
         raise DataError(f"run `make repro` first: {error}") from error
-    seconds: dict[tuple[str, int], list[tuple[float, float]]] = {label: [] for label in methods}
-    with threadpool_limits(1):
-        for _ in range(N_REPEATS):
-            for label, method in methods.items():
-                seconds[label].append((alone(method, actuated), together(method, actuated)))
+    asked = conditions_of(poses, centre_elbows(section.machine, section.samples.box))
+    seconds: dict[tuple[str, int], list[tuple[float, float]]] = {label: [] for label in labels}
+    for _ in range(N_REPEATS):
+        for label, method in methods.items():
+            seconds[label].append((alone(method, asked), together(method, asked)))
     rows = [
         {
             "method": name,
             "n_steps": n_steps,
             "microseconds_single": 1e6 * statistics.median(pair[0] for pair in pairs),
             "microseconds_batched": 1e6 * statistics.median(pair[1] for pair in pairs),
-            "n_batched": len(actuated),
-            "settings": query_checksum(smartee),
+            "n_batched": len(asked),
+            "settings": section.query_key,
         }
         for (name, n_steps), pairs in seconds.items()
     ]
     return pd.DataFrame(rows)
 
 
-def ways(smartee: parameters.SmartEE) -> dict[tuple[str, int], Direct]:
-    """Every start and number of Newton steps; SOLVED: until it converges."""
-    geometry, newton = geometry_of(smartee), smartee.newton
-    found: dict[tuple[str, int], Direct] = {}
-    for name in smartee.networks:
-        path = DATA / "networks" / f"{name}.json"
-        network, _ = load_network(path, network_checksum(smartee, name))
-        for n_steps in range(newton.network_steps + 1):
-            found[name, n_steps] = by_network(geometry, network, n_steps)
-    start = centre_elbows(geometry, smartee.workspace)
-    for n_steps in range(1, newton.shown_steps + 1):
-        found["centre", n_steps] = from_centre(geometry, start, n_steps)
-    found["centre", SOLVED] = solved_from_centre(geometry, start, newton.tolerance, newton.n_steps)
-    return found
-
-
-def alone(method: Direct, actuated: np.ndarray) -> float:
+def alone(method: Method, asked: Conditions) -> float:
     """Median seconds of a call with one pose."""
     seconds = []
     for k in range(N_SINGLE):
+        query, current = asked.query[k : k + 1], asked.current[k : k + 1]
         started = time.perf_counter()
-        method(actuated[k : k + 1])
+        method(query, current)
         seconds.append(time.perf_counter() - started)
     return statistics.median(seconds)
 
 
-def together(method: Direct, actuated: np.ndarray) -> float:
+def together(method: Method, asked: Conditions) -> float:
     """Median seconds of a call with all poses, over their number."""
     seconds = []
     for _ in range(N_BATCHES):
         started = time.perf_counter()
-        method(actuated)
+        method(asked.query, asked.current)
         seconds.append(time.perf_counter() - started)
-    return statistics.median(seconds) / len(actuated)
+    return statistics.median(seconds) / len(asked)
 
 
 def training() -> pd.DataFrame:
     """Seconds and errors of runs of the study, and of runs of LONG times their iterations."""
-    smartee = load_parameters().smartee
+    section = load("smartee")
+    starts = section.studies.starts
     runs = [
         (trainer, spread, start)
-        for trainer in smartee.starts.trainers
-        for spread in smartee.starts.spreads
+        for trainer in starts.trainers
+        for spread in starts.spreads
         for start in range(N_LONG)
     ]
-    with pinned_pool(1) as pool:
-        rows = pd.DataFrame(list(pool.map(run_both, runs)))
+    rows = pd.DataFrame([run_both(run) for run in runs])
     grouped = rows.groupby(["trainer", "spread"], sort=False)
     table = grouped[["seconds", "error", "long_seconds", "long_error"]].median().reset_index()
     table.insert(2, "n_starts", N_LONG)
     table.insert(3, "long_factor", LONG)
-    table["settings"] = [training_time_checksum(smartee, name) for name in table["trainer"]]
+    table["settings"] = [section.training_key(name) for name in table["trainer"]]
     return table
 
 
 def run_both(run: tuple[str, str, int]) -> dict[str, object]:
     """A run with the iterations of the study, and one with LONG times as many."""
-    smartee = load_parameters().smartee
-    trainer, spread, start = run
-    table = read_poses(DATA / "poses", smartee, smartee.starts.poses)
-    options = smartee.trainers[trainer].model_dump()
-    settings = trainer_settings(options.pop("kind"), options)
+    section = load("smartee")
+    starts, (trainer, spread, start) = section.studies.starts, run
+    settings = section.trainers[trainer]
+    rows = SAMPLES / f"{starts.poses}.parquet"
+    task = replace(
+        lesson(Architecture(starts.n_hidden), settings, starts.seed, rows),
+        spread=starts.spreads[spread],
+    )
     row: dict[str, object] = {"trainer": trainer, "spread": spread}
     for prefix, factor in (("", 1), ("long_", LONG)):
-        _, record = train(
-            values(table, ACTUATED_FIELDS),
-            values(table, ELBOW_FIELDS),
-            Architecture(smartee.starts.n_hidden, "tanh"),
-            replace(settings, n_iterations=factor * settings.n_iterations),
-            smartee.starts.seed,
-            quantities(ACTUATED_FIELDS),
-            quantities(ELBOW_FIELDS),
-            restart=start,
-            spread=smartee.starts.spreads[spread],
-        )
-        row |= {f"{prefix}seconds": record.seconds, f"{prefix}error": min(record.errors)}
+        more = settings.but(n_iterations=factor * settings.n_iterations)
+        started = time.perf_counter()
+        _, record = train(replace(task, settings=more), start)
+        seconds = time.perf_counter() - started
+        row |= {f"{prefix}seconds": seconds, f"{prefix}error": min(record.errors)}
     print(row, flush=True)
     return row
 
 
 QUERY_NOTES = (
     f"single: median of {N_SINGLE} calls with one pose; batched: median of {N_BATCHES} "
-    f"calls with the random poses, over their number; medians of {N_REPEATS} repeats. n_steps "
-    f"{SOLVED}: until it converges.",
+    f"calls with the random poses, over their number; medians of {N_REPEATS} repeats. newton: "
+    "until it converges.",
 )
 TRAINING_NOTES = (
     f"Medians of {N_LONG} starts. long: runs of {LONG} times the iterations of the study. Errors: "
@@ -196,7 +169,6 @@ PARTS: dict[str, tuple[Callable[[], pd.DataFrame], str, tuple[str, ...], dict[st
 
 def main() -> None:
     """Measure and report."""
-    os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     chosen = sys.argv[1:] or list(PARTS)
     if unknown := [name for name in chosen if name not in PARTS]:
         raise FlexikError(f"usage: benchmarks/smartee.py [{' | '.join(PARTS)}], not {unknown[0]}")

@@ -2,16 +2,21 @@
 
 from pathlib import Path
 
-from flexik.parameters import SmartEE, overlay, read_yaml
+from flexik.cases.smartee.section import Section
+from flexik.parameters.reading import overlay, read_yaml
 
 ROOT = Path(__file__).parents[1]
 
 
 def section() -> dict:
-    return read_yaml(ROOT / "params.yaml")["smartee"]
+    given = read_yaml(ROOT / "params.yaml")
+    machine = read_yaml(ROOT / "data/machines/smartee.yaml")
+    return given["smartee"] | {"trainers": given["trainers"], "machine": machine}
 
 
-def small(**changes) -> SmartEE:
-    sizes = {name: {"n_poses": 12} for name in section()["poses"]}
-    base = overlay(section(), {"poses": sizes, "outside": {"n_poses": 300}})
-    return SmartEE.model_validate(overlay(base, changes))
+def small(**changes) -> Section:
+    few = {name: {"n_poses": 12} for name in ("training", "dense", "selection")}
+    conditions = {"validation": 12, "random": 12, "outside": 300}
+    counts = {name: {"n_poses": n} for name, n in conditions.items()}
+    base = overlay(section(), {"samples": {"poses": few}, "conditions": counts})
+    return Section.model_validate(overlay(base, changes))

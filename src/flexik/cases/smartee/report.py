@@ -7,16 +7,17 @@ from flexik.cases.smartee.report_results import PUBLISHED_FILE, Results, read
 from flexik.cases.smartee.section import Section
 from flexik.reporting.report import Content, made_from, write_report
 
+TEMPLATE = Path(__file__).with_name("page.md.j2")
+
 
 def report(section: Section) -> None:
     """Write reports/smartee from data/smartee."""
-    write(read(section), Path("reports/smartee"), Path("data/smartee/report.json"))
+    folder, record = Path("reports/smartee"), Path("data/smartee/report.json")
+    sources = made_from(section, [PUBLISHED_FILE])
+    write_report(folder, TEMPLATE, content(read(section)), sources=sources, record=record)
 
 
-def write(results: Results, folder: Path, record: Path) -> None:
-    """Write the report of `results` into `folder`."""
-    content = Content(figures=report_figures.figures(results))
-    content |= report_tables.content(results) | report_starts.content(results)
-    sources = made_from(results.section, [PUBLISHED_FILE])
-    template = Path(__file__).with_name("page.md.j2")
-    write_report(folder, template, content, sources=sources, record=record)
+def content(results: Results) -> Content:
+    """Tables, figures, metrics and values of the page."""
+    figures = Content(figures=report_figures.figures(results))
+    return figures | report_tables.content(results) | report_starts.content(results)

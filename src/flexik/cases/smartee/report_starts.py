@@ -41,32 +41,39 @@ def metrics(results: Results) -> dict[str, float]:
     return found
 
 
+TITLES = {
+    "trainer": "trainer",
+    "spread": "start",
+    "success_percent": "success (%)",
+    "least_error": "least error",
+    "median_error": "median error",
+    "largest_error": "largest error",
+    "peak_mrad": "median elbow peak (mrad)",
+    "iterations": "iterations",
+    "median_success_iteration": "to success",
+    "reasons": "ended by",
+    "seconds": "seconds a run",
+    "long_error": "median error of long runs",
+}
+
+
 def starts(results: Results) -> pd.DataFrame:
     """A row for every trainer and spread, with the times of the benchmark."""
-    times = results.training_times.set_index(["trainer", "spread"])
-    reasons = results.starts.groupby(["trainer", "spread"])["stop_reason"].agg(_counted)
-    rows = []
-    for row in by_trainer(results.starts).to_dict("records"):
-        key = row["trainer"], row["spread"]
-        time = times.loc[key] if key in times.index else pd.Series(dtype=float)
-        first = float(row["median_success_iteration"])
-        rows.append(
-            {
-                "trainer": row["trainer"],
-                "start": row["spread"],
-                "success (%)": 100.0 * float(row["success_share"]),
-                "least error": scientific(row["least_error"]),
-                "median error": scientific(row["median_error"]),
-                "largest error": scientific(row["largest_error"]),
-                "median elbow peak (mrad)": MM * float(row["median_judged"]),
-                "iterations": str(results.section.trainers[row["trainer"]].n_iterations),
-                "to success": "" if np.isnan(first) else f"{first:.0f}",
-                "ended by": reasons[key],
-                "seconds a run": float(time.get("seconds", np.nan)),
-                "median error of long runs": scientific(float(time.get("long_error", np.nan))),
-            }
-        )
-    return pd.DataFrame(rows)
+    keys, trainers = ["trainer", "spread"], results.section.trainers
+    times = results.training_times[[*keys, "seconds", "long_error"]]
+    found = by_trainer(results.starts).merge(times, "left", keys)
+    ends = results.starts.groupby(keys, sort=False)["stop_reason"].agg(_counted)
+    found = found.assign(
+        success_percent=100.0 * found["success_share"],
+        peak_mrad=MM * found["median_judged"],
+        iterations=[str(trainers[name].n_iterations) for name in found["trainer"]],
+        reasons=ends.to_numpy(),
+    )
+    for name in ("least_error", "median_error", "largest_error", "long_error"):
+        found[name] = found[name].map(scientific)
+    first = found["median_success_iteration"]
+    found["median_success_iteration"] = ["" if np.isnan(v) else f"{v:.0f}" for v in first]
+    return found[list(TITLES)].rename(columns=TITLES)
 
 
 def thresholds(results: Results) -> pd.DataFrame:
@@ -81,12 +88,11 @@ def thresholds(results: Results) -> pd.DataFrame:
 def sensitivity(results: Results) -> pd.DataFrame:
     """A row for every pair of the two constants: what the same starts come to."""
     rows = []
-    for pair, group in results.sensitivity.groupby("trainer", sort=False):
-        penalty, decrease = str(pair).split(", ")
-        row: dict[str, object] = {"p": penalty, "tau": decrease}
-        row["success (%)"] = _share(group["error"], results.section.studies.starts.success)
-        for name, error in zip(("least", "median", "largest"), _three(group["error"]), strict=True):
-            row[f"{name} error"] = scientific(error)
+    for pair, group in results.sensitivity.groupby("trainer", sort=False)["error"]:
+        row: dict[str, object] = dict(zip(("p", "tau"), str(pair).split(", "), strict=True))
+        row["success (%)"] = _share(group, results.section.studies.starts.success)
+        for statistic, name in (("min", "least"), ("median", "median"), ("max", "largest")):
+            row[f"{name} error"] = scientific(group.agg(statistic))
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -209,10 +215,6 @@ def _size(results: Results, poses: str, table: pd.DataFrame) -> dict[str, Any]:
         "ratios": [ratio.min(), ratio.max()],
         "extents": [samples[poses].extent, samples[SELECTION].extent],
     }
-
-
-def _three(errors: pd.Series) -> tuple[float, float, float]:
-    return errors.min(), errors.median(), errors.max()
 
 
 def _share(errors: pd.Series, limit: float) -> float:

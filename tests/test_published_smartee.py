@@ -1,6 +1,6 @@
 """What the last run of the pipeline reports of the SmartEE, against published values and targets.
 
-Long training amplifies rounding, so another CPU trains other networks: some room is left.
+A peak hangs on the start of the training, so the median over the restarts counts.
 """
 
 import json
@@ -25,10 +25,12 @@ def published():
 
 
 @pytest.mark.parametrize("quantity", ["elbow", "position", "orientation"])
-def test_published_trainer_reaches_the_published_peaks(metrics, published, quantity):
+def test_networks_reach_the_published_peaks_and_a_tenth_of_them(metrics, published, quantity):
     unit, peak = published.loc[quantity, ["unit", "peak"]]
+    assert metrics[f"network.peak_{quantity}_{unit}_median"] <= peak
     assert metrics[f"network.peak_{quantity}_{unit}"] <= peak
-    assert metrics[f"best.peak_{quantity}_{unit}"] <= ROOM * 0.1 * peak
+    assert metrics[f"best.peak_{quantity}_{unit}_median"] <= 0.1 * peak
+    assert metrics[f"best.peak_{quantity}_{unit}_largest"] <= ROOM * 0.1 * peak
 
 
 def test_two_newton_steps_leave_nothing_to_speak_of(metrics):
