@@ -1,10 +1,12 @@
 """Small training problems, and the same network written independently for automatic derivatives."""
 
 import functools
+import pickle
 
 import numpy as np
 import torch
 
+from flexik.datasets.parts import Work
 from flexik.learning.problem import Problem, problem
 from flexik.learning.weights import Weights, flatten, initial_weights
 
@@ -74,3 +76,14 @@ def taught(
     targets = outputs(torch.from_numpy(flatten(teacher)), teacher, activation, inputs).numpy()
     targets = targets.reshape(n, 2) + noise * generator.normal(size=(n, 2))
     return teacher, problem(activation, inputs, targets)
+
+
+def written(work: Work, folder):
+    """Files of `work` by extension; its function and results are pickled as between processes."""
+    there = pickle.loads(pickle.dumps(work.function))
+    results = [pickle.loads(pickle.dumps(there(item))) for item in work.items]
+    files = {}
+    for extension, write in work.finish(results).items():
+        files[extension] = folder / f"name{extension}"
+        write(files[extension])
+    return files

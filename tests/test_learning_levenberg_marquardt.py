@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from learning_problems import dense, errors_function, some_problem, taught
 from scipy.optimize import least_squares
 
-from flexik.errors import TrainingError
 from flexik.learning import accelerated, levenberg_marquardt
 from flexik.learning.accelerated import LevenbergMarquardtAccelerated, with_solved_outputs
 from flexik.learning.levenberg_marquardt import LevenbergMarquardt
@@ -352,22 +351,3 @@ def test_a_trial_that_overflows_is_not_taken(trainer, monkeypatch):
     minimum = minimise(*some_problem(), trainer(n_iterations=5))
     assert len(calls) > 5
     assert np.all(np.diff(minimum.errors) < 0.0)
-
-
-@pytest.mark.parametrize(
-    ("trainer", "name", "value"),
-    [
-        (LevenbergMarquardt, "mu", 0.0),
-        (LevenbergMarquardt, "mu", math.nan),
-        (LevenbergMarquardt, "mu_decrease", 1.5),
-        (LevenbergMarquardt, "mu_increase", 1.0),
-        (LevenbergMarquardt, "mu_maximum", 1e-4),
-        (LevenbergMarquardt, "mu_maximum", math.inf),
-        (LevenbergMarquardtAccelerated, "mu", 0.0),
-        (LevenbergMarquardtAccelerated, "mu_maximum", 1e-4),
-        (LevenbergMarquardtAccelerated, "acceleration", -0.1),
-    ],
-)
-def test_settings_out_of_range_are_named(trainer, name, value):
-    with pytest.raises(TrainingError, match=f"{name}={value}"):
-        trainer(**{name: value})

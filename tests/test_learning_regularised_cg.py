@@ -6,7 +6,6 @@ from learning_problems import ARCHITECTURES, dense, some_problem, taught
 from scipy.optimize import minimize
 from scipy.sparse.linalg import cg
 
-from flexik.errors import TrainingError
 from flexik.learning import regularised_cg
 from flexik.learning.problem import Problem
 from flexik.learning.regularised_cg import RegularisedCg, minimise
@@ -145,16 +144,3 @@ def test_a_strong_penalty_pulls_saturated_weights_back_and_lets_them_grow_again(
     assert np.linalg.norm(flatten(one.weights)) < 0.1 * np.linalg.norm(flatten(start))
     assert np.linalg.norm(flatten(one.weights)) < np.linalg.norm(flatten(many.weights))
     assert min(many.errors) < 0.2 * one.errors[-1] < 1e-5 * one.errors[0]
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        *(("penalty", 0.0), ("penalty_decrease", 1.0), ("weight_tolerance", 0.0)),
-        *(("error_tolerance", -1.0), ("round_steps", 0), ("round_progress", 1.0)),
-        *(("cg_iterations", 0), ("cg_tolerance", 0.0)),
-    ],
-)
-def test_settings_out_of_range_are_named(name, value):
-    with pytest.raises(TrainingError, match=name):
-        RegularisedCg(**{name: value})

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 import torch
 from learning_problems import dense, errors_function, some_problem, taught
+from pydantic import ValidationError
 
-from flexik.learning.adam import Adam
+from flexik.errors import ParameterError
+from flexik.learning.adam import Adam, rate
 from flexik.learning.back_propagation import BackPropagation
 from flexik.learning.lbfgs import Lbfgs
 from flexik.learning.problem import Problem
@@ -16,14 +18,15 @@ from flexik.learning.regularised_cg import RegularisedCg
 from flexik.learning.stopping import Minimum, Monitor, Stopping, StopReason
 from flexik.learning.training import TRAINERS
 from flexik.learning.weights import Weights, flatten, moved
+from flexik.parameters.reading import validated
+from flexik.parameters.trainers import Trainer
 
 SETTINGS = (BackPropagation, Adam, Lbfgs, RegularisedCg)
 every_trainer = pytest.mark.parametrize("trainer", SETTINGS)
 
 
 def minimise(start: Weights, problem: Problem, limits: Stopping, seed: int = 0) -> Minimum:
-    trainer = next(trainer for trainer in TRAINERS.values() if trainer.settings is type(limits))
-    return trainer.minimise(start, problem, limits, np.random.default_rng(seed))
+    return TRAINERS[limits.kind](start, problem, limits, np.random.default_rng(seed))
 
 
 def test_batch_steps_follow_equation_54():
@@ -172,13 +175,45 @@ def test_patience_counts_from_the_least_selection_error():
 
 def test_the_rate_of_adam_falls_along_half_a_cosine():
     limits = Adam(n_iterations=2, learning_rate=0.01, final_rate=0.2)
-    assert [limits.rate(done) for done in (0.0, 0.5, 1.0)] == pytest.approx([0.01, 0.006, 0.002])
+    assert [rate(limits, done) for done in (0.0, 0.5, 1.0)] == pytest.approx([0.01, 0.006, 0.002])
     start, problem = some_problem()
     # the first steps of Adam are as long as its rate
     first = minimise(start, problem, Adam(n_iterations=1, learning_rate=0.01, final_rate=0.0))
     assert np.abs(flatten(first.weights) - flatten(start)).max() == pytest.approx(0.01, rel=1e-4)
     constant = Adam(n_iterations=2, learning_rate=0.01)
-    assert constant.rate(0.7) == constant.rate(0.0)
+    assert rate(constant, 0.7) == rate(constant, 0.0)
     one, other = (minimise(start, problem, settings) for settings in (limits, constant))
     moves = [np.abs(flatten(run.weights) - flatten(first.weights)).max() for run in (one, other)]
     assert moves[0] == pytest.approx(0.6 * moves[1], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [
+        ("levenberg_marquardt", {"mu": math.nan}),
+        ("levenberg_marquardt", {"mu_decrease": 1.5}),
+        ("levenberg_marquardt", {"mu_increase": 1.0}),
+        ("levenberg_marquardt", {"mu_maximum": math.inf}),
+        ("levenberg_marquardt_accelerated", {"mu": 0.0}),
+        ("levenberg_marquardt_accelerated", {"mu": 1e11}),
+        ("levenberg_marquardt_accelerated", {"acceleration": -0.1}),
+        ("back_propagation", {"mode": "online"}),
+        ("back_propagation", {"minimum_rate": 1.0}),
+        ("adam", {"mu": 1.0}),
+        ("adam", {"beta_1": 1.0}),
+        ("lbfgs", {"n_iterations": 1.5}),
+        ("lbfgs", {"memory": True}),
+        ("lbfgs", {"goal": "1e-3"}),
+        ("regularised_cg", {"penalty_decrease": 1.0}),
+    ],
+)
+def test_bad_settings_are_told_in_one_line_that_names_the_key(kind, options):
+    (key,) = options
+    with pytest.raises(ParameterError, match=rf"^params.yaml: {key}: [^\n]*$"):
+        validated(Trainer, {"kind": kind, **options}, lambda keys: ("params.yaml", ".".join(keys)))
+
+
+def test_changed_settings_are_checked_too():
+    assert Adam().but(beta_1=0.5) == Adam(beta_1=0.5)
+    with pytest.raises(ValidationError, match="beta_1"):
+        Adam().but(beta_1=1.0)

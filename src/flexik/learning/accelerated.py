@@ -16,8 +16,9 @@ from flexik.learning.levenberg_marquardt import MU_MINIMUM
 from flexik.learning.normal_equations import NormalEquations, cholesky, normal_equations
 from flexik.learning.perceptron import Array
 from flexik.learning.problem import Problem
-from flexik.learning.stopping import Minimum, Monitor, Stopping, StopReason
+from flexik.learning.stopping import Minimum, Monitor, StopReason
 from flexik.learning.weights import Weights, moved, unflatten
+from flexik.parameters.trainers import LevenbergMarquardtAccelerated
 
 # share of the largest diagonal element by which every weight is damped at least
 _SCALE_FLOOR = 1e-3
@@ -25,33 +26,6 @@ _SCALE_FLOOR = 1e-3
 _RIDGE = 1e-10
 # mu falls by this factor at most in one step
 _MU_DECREASE = 0.2
-
-
-@dataclass(frozen=True)
-class LevenbergMarquardtAccelerated(Stopping):
-    """Settings of the trainer.
-
-    Attributes
-    ----------
-    mu : first damping, relative to the diagonal of J^T J
-    mu_maximum : the run ends when mu would exceed it
-    acceleration : largest ratio of twice the second-order to the first-order step at which the
-        former is added; 0 leaves it out
-    """
-
-    minimum_progress: float = 1e-3
-    progress_window: int = 5
-    mu: float = 1e-2
-    mu_maximum: float = 1e10
-    acceleration: float = 0.75
-
-    def ranges(self) -> dict[str, bool]:
-        """Whether each setting is in its range."""
-        return super().ranges() | {
-            "mu": self.mu > 0.0,
-            "mu_maximum": self.mu <= self.mu_maximum < math.inf,
-            "acceleration": 0.0 <= self.acceleration < math.inf,
-        }
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,6 @@ Source: Rouvinen 1999, equations 49 to 54, with linear outputs, so that equation
 factor y (1 - y); the learning rate varies as in MATLAB's traingdx.
 """
 
-import math
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,50 +13,9 @@ from numpy.typing import NDArray
 
 from flexik.learning.perceptron import Array, activate, slope
 from flexik.learning.problem import Problem
-from flexik.learning.stopping import Minimum, Monitor, Stopping, StopReason
+from flexik.learning.stopping import Minimum, Monitor, StopReason
 from flexik.learning.weights import Weights, flatten, unflatten
-
-MODES = ("pattern", "batch")
-
-
-@dataclass(frozen=True)
-class BackPropagation(Stopping):
-    """Settings of the trainer; an iteration is one pass over the data (an epoch).
-
-    Attributes
-    ----------
-    mode : "pattern": a step after each sample, in random order; "batch": one step a pass, along
-        the mean of the samples' gradients, so that the learning rate does not depend on their
-        number
-    learning_rate : eta of equation 51, the first one
-    momentum : alpha of equation 54
-    rate_increase : factor of the learning rate after a pass that lowers the error
-    rate_decrease : factor after a pass that raises it by more than `error_increase`; that pass is
-        taken back and the momentum cleared
-    error_increase : largest factor by which a pass may raise the error
-    minimum_rate : the run ends when the learning rate falls below it
-    """
-
-    minimum_progress: float = 0.0
-    mode: str = "batch"
-    learning_rate: float = 0.01
-    momentum: float = 0.9
-    rate_increase: float = 1.05
-    rate_decrease: float = 0.7
-    error_increase: float = 1.04
-    minimum_rate: float = 1e-12
-
-    def ranges(self) -> dict[str, bool]:
-        """Whether each setting is in its range."""
-        return super().ranges() | {
-            "mode": self.mode in MODES,
-            "learning_rate": 0.0 < self.learning_rate < math.inf,
-            "momentum": 0.0 <= self.momentum < 1.0,
-            "rate_increase": 1.0 <= self.rate_increase < math.inf,
-            "rate_decrease": 0.0 < self.rate_decrease < 1.0,
-            "error_increase": 1.0 <= self.error_increase < math.inf,
-            "minimum_rate": 0.0 < self.minimum_rate <= self.learning_rate,
-        }
+from flexik.parameters.trainers import BackPropagation
 
 
 def minimise(

@@ -1,31 +1,13 @@
 """L-BFGS training of a perceptron, by SciPy."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.optimize import OptimizeResult, minimize
 
 from flexik.learning.perceptron import Array
 from flexik.learning.problem import Problem
-from flexik.learning.stopping import Minimum, Monitor, Stopping, StopReason
+from flexik.learning.stopping import Minimum, Monitor, StopReason
 from flexik.learning.weights import Weights, flatten, unflatten
-
-
-@dataclass(frozen=True)
-class Lbfgs(Stopping):
-    """Settings of the trainer.
-
-    Attributes
-    ----------
-    memory : steps from which the curvature is estimated
-    """
-
-    minimum_progress: float = 1e-6
-    memory: int = 20
-
-    def ranges(self) -> dict[str, bool]:
-        """Whether each setting is in its range."""
-        return super().ranges() | {"memory": self.memory >= 1}
+from flexik.parameters.trainers import Lbfgs
 
 
 def minimise(start: Weights, problem: Problem, settings: Lbfgs, _: np.random.Generator) -> Minimum:

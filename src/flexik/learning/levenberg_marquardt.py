@@ -4,44 +4,16 @@ Source: Rouvinen 1999, equations 55 and 56; Hagan and Menhaj 1994; the schedule 
 MATLAB's trainlm.
 """
 
-import math
-from dataclasses import dataclass
-
 import numpy as np
 
 from flexik.learning.normal_equations import normal_equations
 from flexik.learning.problem import Problem
-from flexik.learning.stopping import Minimum, Monitor, Stopping, StopReason
+from flexik.learning.stopping import Minimum, Monitor, StopReason
 from flexik.learning.weights import Weights, moved
+from flexik.parameters.trainers import LevenbergMarquardt
 
 # mu must not underflow to zero, from where no factor brings it back
 MU_MINIMUM = 1e-20
-
-
-@dataclass(frozen=True)
-class LevenbergMarquardt(Stopping):
-    """Settings of the trainer; the defaults of mu are those of MATLAB's trainlm.
-
-    Attributes
-    ----------
-    mu : first damping of equation 56
-    mu_decrease, mu_increase : factors of mu after a step that lowers the error, and one that fails
-    mu_maximum : the run ends when mu would exceed it
-    """
-
-    mu: float = 1e-3
-    mu_decrease: float = 0.1
-    mu_increase: float = 10.0
-    mu_maximum: float = 1e10
-
-    def ranges(self) -> dict[str, bool]:
-        """Whether each setting is in its range."""
-        return super().ranges() | {
-            "mu": self.mu > 0.0,
-            "mu_decrease": 0.0 < self.mu_decrease <= 1.0,
-            "mu_increase": 1.0 < self.mu_increase < math.inf,
-            "mu_maximum": self.mu <= self.mu_maximum < math.inf,
-        }
 
 
 def minimise(

@@ -12,7 +12,6 @@ preconditioner is the diagonal, with squares passed back through the layers (Bec
 """
 
 import math
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,57 +19,14 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from flexik.learning.perceptron import Array
 from flexik.learning.problem import Problem
-from flexik.learning.stopping import Minimum, Monitor, Stopping, StopReason
+from flexik.learning.stopping import Minimum, Monitor, StopReason
 from flexik.learning.weights import Weights, flatten, unflatten
+from flexik.parameters.trainers import RegularisedCg
 
 # share of the fall along the gradient that a step must keep, and the shortest step tried
 _DECREASE, _SHORTEST = 1e-4, 1e-6
 # share of its largest element that every element of the preconditioner has at least
 _FLOOR = 1e-4
-
-
-@dataclass(frozen=True)
-class RegularisedCg(Stopping):
-    """Settings of the trainer; an iteration is a Newton step.
-
-    `goal` is the paper's epsilon: a round that ends at or below it is a successful training.
-
-    Attributes
-    ----------
-    penalty : p of the first round; E is the mean squared error of the normalised outputs
-    penalty_decrease : tau, factor of p after a round
-    weight_tolerance, error_tolerance : delta and sigma; the training has failed when a round moves
-        the weights by at most delta and changes E by at most this share
-    round_steps : Newton steps of a round at most
-    round_progress : relative fall of the penalised error in a step under which the round ends
-    cg_iterations : conjugate gradients of a step at most
-    cg_tolerance : relative residual at which they end, or the square root of the norm of the
-        gradient where that is smaller
-    """
-
-    n_iterations: int = 500
-    minimum_progress: float = 0.0
-    penalty: float = 1e-4
-    penalty_decrease: float = 0.3
-    weight_tolerance: float = 1e-3
-    error_tolerance: float = 1e-3
-    round_steps: int = 20
-    round_progress: float = 1e-2
-    cg_iterations: int = 100
-    cg_tolerance: float = 0.5
-
-    def ranges(self) -> dict[str, bool]:
-        """Whether each setting is in its range."""
-        return super().ranges() | {
-            "penalty": 0.0 < self.penalty < math.inf,
-            "penalty_decrease": 0.0 < self.penalty_decrease < 1.0,
-            "weight_tolerance": 0.0 < self.weight_tolerance < math.inf,
-            "error_tolerance": 0.0 < self.error_tolerance < math.inf,
-            "round_steps": self.round_steps >= 1,
-            "round_progress": 0.0 <= self.round_progress < 1.0,
-            "cg_iterations": self.cg_iterations >= 1,
-            "cg_tolerance": 0.0 < self.cg_tolerance < 1.0,
-        }
 
 
 class _Point(NamedTuple):
@@ -90,7 +46,7 @@ def minimise(
     The errors of the record are E at every step; they may rise within a round.
     """
     # the goal counts where a round ends, not on the way
-    monitor = Monitor(problem, replace(settings, goal=0.0))
+    monitor = Monitor(problem, settings.but(goal=0.0))
     penalty, origin = settings.penalty, _point(flatten(start), start, problem, settings.penalty)
     reason = monitor.add(start, origin.error)
     if reason is None and np.linalg.norm(origin.gradient) <= settings.minimum_gradient:

@@ -6,21 +6,18 @@ A size is the number of neurons of the one hidden layer, or of each of several.
 """
 
 import functools
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from flexik.datasets.parallel import ParallelSettings
-from flexik.datasets.resumable import compute_table
+from flexik.datasets.parts import Columns, Work, Writer, json_file, stacked, table
 from flexik.datasets.tables import Field
 from flexik.errors import DataError, TrainingError
 from flexik.files import read_json
-from flexik.learning.perceptron import Array, Quantity
-from flexik.learning.stopping import Stopping
-from flexik.learning.training import Architecture, Judge, train
+from flexik.learning.training import Architecture, Lesson, train
 
 FIELDS = (
     Field("n_hidden", "1", "neurons in the hidden layer", "int64"),
@@ -32,8 +29,8 @@ FIELDS = (
 )
 FAILED = "failed"
 
-# Neurons of the hidden layer, or of each of several
-Size = int | tuple[int, ...]
+# Neurons of every hidden layer
+Size = tuple[int, ...]
 
 
 def study_fields(n_layers: int) -> tuple[Field, ...]:
@@ -55,49 +52,49 @@ def layer_columns(table: pd.DataFrame) -> list[str]:
     return [name for name in table.columns if str(name).startswith("n_hidden")]
 
 
-@dataclass(frozen=True, eq=False)
-class Study:
-    """What all runs of a study share; the fields are those of learning.training.train."""
+def select(
+    lesson: Lesson, sizes: Sequence[Size], n_restarts: int, tolerance: float | None = 0.0
+) -> Work:
+    """Train `lesson` in every size from every start.
 
-    inputs: Array
-    outputs: Array
-    selection_inputs: Array
-    selection_outputs: Array
-    architecture: Architecture
-    settings: Stopping
-    seed: int
-    input_quantities: Sequence[Quantity]
-    output_quantities: Sequence[Quantity]
-    judge: Judge | None = None
+    The files are a row a run (.parquet, columns `study_fields`) and the chosen n_hidden (.json),
+    the latter unless `tolerance` is None. A run is the restart of the same number of a network of
+    that size.
 
-
-def run_study(
-    path: Path | str,
-    study: Study,
-    sizes: Sequence[Size],
-    n_restarts: int,
-    parameters_checksum: str,
-    key: str,
-    settings: ParallelSettings,
-    description: str,
-) -> int:
-    """Train every size from every start, in parallel, into the Parquet table `path`.
-
-    Its columns are `study_fields`. A run is the restart of the same number of `train_best` with
-    that size. Killed and run again it goes on where it was; returns the number of runs that were
-    there. See `compute_table`. Raises TrainingError if sizes differ in their number of layers.
+    Parameters
+    ----------
+    sizes : of as many hidden layers each; TrainingError if not
+    tolerance : as for `choose_layers`
     """
-    path = Path(path)
-    numbers = {len(_layers(size)) for size in sizes}
-    if len(numbers) != 1:
+    if len({len(size) for size in sizes}) != 1:
         raise TrainingError(f"sizes {list(sizes)}: expected as many hidden layers in each")
-    fields = study_fields(numbers.pop())
-    runs = [(n_hidden, restart) for n_hidden in sizes for restart in range(n_restarts)]
-    function = functools.partial(_run, study)
-    folder = path.parent / f".{path.stem}_parts"
-    return compute_table(
-        path, function, runs, fields, parameters_checksum, key, settings, description, folder
-    )
+    fields = study_fields(len(sizes[0]))
+
+    def finish(results: list[Columns]) -> Mapping[str, Writer]:
+        columns = stacked(results, fields)
+        files = {".parquet": table(columns, fields)}
+        if tolerance is not None:
+            chosen = choose_layers(by_size(pd.DataFrame(columns)), tolerance)
+            n_hidden = chosen[0] if len(chosen) == 1 else list(chosen)
+            files[".json"] = json_file({"n_hidden": n_hidden})
+        return files
+
+    runs = [(size, restart) for size in sizes for restart in range(n_restarts)]
+    return Work(functools.partial(_run, lesson), runs, finish)
+
+
+def _run(lesson: Lesson, run: tuple[Size, int]) -> Columns:
+    size, restart = run
+    try:
+        architecture = Architecture(size, lesson.architecture.activation)
+        _, record = train(replace(lesson, architecture=architecture), restart)
+        found = record.selection_error
+        errors = record.training_error, np.nan if found is None else found
+        row = (*size, restart, *errors, len(record.errors) - 1, str(record.stop_reason))
+    except TrainingError:
+        row = (*size, restart, np.nan, np.nan, 0, FAILED)
+    fields = study_fields(len(size))
+    return {field.name: np.array([value]) for field, value in zip(fields, row, strict=True)}
 
 
 def by_size(runs: pd.DataFrame) -> pd.DataFrame:
@@ -139,12 +136,6 @@ def choose_layers(sizes: pd.DataFrame, tolerance: float = 0.0) -> tuple[int, ...
     return tuple(min(rows, key=lambda row: (sum(row), *row)))
 
 
-def choose(sizes: pd.DataFrame, tolerance: float = 0.0) -> int:
-    """As `choose_layers`, of networks with one hidden layer."""
-    (n_hidden,) = choose_layers(sizes, tolerance)
-    return n_hidden
-
-
 def read_layers(path: Path | str) -> tuple[int, ...]:
     """The chosen n_hidden, number or list, in the JSON file `path`; DataError if there is none."""
     chosen = read_json(path)
@@ -153,45 +144,3 @@ def read_layers(path: Path | str) -> tuple[int, ...]:
     if not all(isinstance(n, int) and n >= 1 for n in layers):
         raise DataError(f"{path}: expected a positive integer n_hidden, got {n_hidden!r}")
     return tuple(layers)
-
-
-def read_choice(path: Path | str) -> int:
-    """As `read_layers`, of a network with one hidden layer."""
-    layers = read_layers(path)
-    if len(layers) != 1:
-        raise DataError(f"{path}: expected one hidden layer, got {list(layers)}")
-    return layers[0]
-
-
-def _layers(size: Size) -> tuple[int, ...]:
-    return size if isinstance(size, tuple) else (size,)
-
-
-def _run(study: Study, run: tuple[Size, int]) -> dict[str, np.ndarray]:
-    n_hidden, restart = run
-    layers = _layers(n_hidden)
-    try:
-        _, record = train(
-            study.inputs,
-            study.outputs,
-            replace(study.architecture, n_hidden=n_hidden),
-            study.settings,
-            study.seed,
-            study.input_quantities,
-            study.output_quantities,
-            (study.selection_inputs, study.selection_outputs),
-            restart,
-            study.judge,
-        )
-        row = (
-            *layers,
-            restart,
-            float(np.sqrt(record.errors[record.kept])),
-            record.selection_error,
-            len(record.errors) - 1,
-            str(record.stop_reason),
-        )
-    except TrainingError:
-        row = (*layers, restart, np.nan, np.nan, 0, FAILED)
-    fields = study_fields(len(layers))
-    return {field.name: np.array([value]) for field, value in zip(fields, row, strict=True)}

@@ -5,20 +5,18 @@ stop a trainer, and does a fading weight penalty help?
 """
 
 import functools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+import itertools
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
-from flexik.datasets.parallel import ParallelSettings
-from flexik.datasets.resumable import compute_table
+from flexik.datasets.parts import Columns, Work, rows
 from flexik.datasets.tables import Field
 from flexik.errors import TrainingError
-from flexik.learning.perceptron import Array, Quantity
-from flexik.learning.stopping import Stopping
-from flexik.learning.training import Architecture, Judge, train
+from flexik.learning.training import Lesson, train
+from flexik.parameters.trainers import Stopping
 
 FIELDS = (
     Field("trainer", "1", "name of the trainer", "string"),
@@ -34,57 +32,25 @@ FAILED = "failed"
 NO_SUCCESS = -1
 
 
-@dataclass(frozen=True, eq=False)
-class StartStudy:
-    """What all runs of a study share.
+def from_starts(
+    lesson: Lesson,
+    trainers: Mapping[str, Stopping],
+    spreads: Mapping[str, float],
+    n_starts: int,
+    success: float,
+) -> Work:
+    """Train `lesson`, which has a judge, with every trainer from every start of every spread.
 
-    Attributes
+    The file is a table of FIELDS; all trainers have the same starts.
+
+    Parameters
     ----------
-    inputs, outputs, architecture, seed, input_quantities, output_quantities, judge : of
-        learning.training.train
-    trainers : settings by name
-    spreads : of the initial weights, by name
+    trainers, spreads : settings, and spreads of the initial weights, by name
     success : mean squared error of the normalised outputs at which a start counts as successful
     """
-
-    inputs: Array
-    outputs: Array
-    architecture: Architecture
-    trainers: Mapping[str, Stopping]
-    spreads: Mapping[str, float]
-    success: float
-    seed: int
-    input_quantities: Sequence[Quantity]
-    output_quantities: Sequence[Quantity]
-    judge: Judge
-
-
-def run_starts(
-    path: Path | str,
-    study: StartStudy,
-    n_starts: int,
-    parameters_checksum: str,
-    key: str,
-    settings: ParallelSettings,
-    description: str,
-) -> int:
-    """Train with every trainer from every start of every spread into the table `path` of FIELDS.
-
-    All trainers have the same starts. Killed and run again it goes on where it was; returns the
-    number of runs that were there. See `compute_table`.
-    """
-    path = Path(path)
-    runs = [
-        (trainer, spread, start)
-        for trainer in study.trainers
-        for spread in study.spreads
-        for start in range(n_starts)
-    ]
-    function = functools.partial(_run, study)
-    folder = path.parent / f".{path.stem}_parts"
-    return compute_table(
-        path, function, runs, FIELDS, parameters_checksum, key, settings, description, folder
-    )
+    runs = [(*names, k) for names in itertools.product(trainers, spreads) for k in range(n_starts)]
+    function = functools.partial(_run, lesson, dict(trainers), dict(spreads), success)
+    return Work(function, runs, rows(*FIELDS))
 
 
 def by_trainer(runs: pd.DataFrame) -> pd.DataFrame:
@@ -115,29 +81,24 @@ def by_trainer(runs: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _run(study: StartStudy, run: tuple[str, str, int]) -> dict[str, np.ndarray]:
+def _run(
+    lesson: Lesson,
+    trainers: Mapping[str, Stopping],
+    spreads: Mapping[str, float],
+    success: float,
+    run: tuple[str, str, int],
+) -> Columns:
     trainer, spread, start = run
     try:
-        _, record = train(
-            study.inputs,
-            study.outputs,
-            study.architecture,
-            study.trainers[trainer],
-            study.seed,
-            study.input_quantities,
-            study.output_quantities,
-            restart=start,
-            judge=study.judge,
-            spread=study.spreads[spread],
-        )
+        own = replace(lesson, settings=trainers[trainer], spread=spreads[spread])
+        _, record = train(own, start)
     except TrainingError:
         values = (np.nan, 0, NO_SUCCESS, np.nan, FAILED)
     else:
         errors = np.array(record.errors)
-        low = np.flatnonzero(errors <= study.success)
+        low = np.flatnonzero(errors <= success)
         first = int(low[0]) if low.size else NO_SUCCESS
-        reason = str(record.stop_reason)
         judged = np.nan if record.selection_error is None else record.selection_error
-        values = (float(errors.min()), len(errors) - 1, first, float(judged), reason)
+        values = (float(errors.min()), len(errors) - 1, first, judged, str(record.stop_reason))
     row = (trainer, spread, start, *values)
     return {field.name: np.array([value]) for field, value in zip(FIELDS, row, strict=True)}

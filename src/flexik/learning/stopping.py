@@ -1,15 +1,13 @@
-"""When a training run ends, which network it keeps, and the settings all trainers share."""
+"""When a training run ends, and which network it keeps."""
 
 import math
-import numbers
 import time
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, get_args
 
-from flexik.errors import TrainingError
 from flexik.learning.problem import Problem
 from flexik.learning.weights import Weights
+from flexik.parameters.trainers import Stopping
 
 
 class StopReason(StrEnum):
@@ -26,73 +24,6 @@ class StopReason(StrEnum):
     STATIONARY = "stationary"  # a round of weaker penalty changes neither weights nor error
     SINGULAR = "singular"  # the damped system has no Cholesky factor up to the largest mu
     NON_FINITE = "non_finite"  # the error or its derivatives overflowed
-
-
-@dataclass(frozen=True)
-class Stopping:
-    """When to stop; the settings every trainer has.
-
-    Attributes
-    ----------
-    n_iterations : largest number of iterations (accepted steps, or passes over the data)
-    goal : mean squared error (normalised outputs) at which the run ends
-    minimum_gradient : Euclidean norm of the gradient of the mean squared error at which it ends
-    minimum_progress : relative fall of that error over `progress_window` iterations under which
-        it ends; 0: never
-    maximum_seconds : wall time after which it ends; results then depend on the machine
-    selection_patience : iterations without a new least selection error after which it ends; the
-        network of the least selection error is kept, however the run ends
-
-    Raises
-    ------
-    TrainingError
-        When a setting is of another type or out of range.
-    """
-
-    n_iterations: int = 1000
-    goal: float = 0.0
-    minimum_gradient: float = 1e-7
-    minimum_progress: float = 1e-4
-    progress_window: int = 20
-    maximum_seconds: float | None = None
-    selection_patience: int | None = None
-
-    def __post_init__(self) -> None:
-        for setting in fields(self):
-            value = getattr(self, setting.name)
-            if not _is_of(value, setting.type):
-                kinds = " or ".join(_KINDS[kind] for kind in _kinds(setting.type))
-                raise TrainingError(f"trainer setting {setting.name}={value!r}, expected {kinds}")
-        for name, valid in self.ranges().items():
-            if not valid:
-                raise TrainingError(f"trainer setting {name}={getattr(self, name)} is out of range")
-
-    def ranges(self) -> dict[str, bool]:
-        """Whether each setting is in its range."""
-        return {
-            "n_iterations": self.n_iterations >= 1,
-            "goal": 0.0 <= self.goal < math.inf,
-            "minimum_gradient": 0.0 <= self.minimum_gradient < math.inf,
-            "minimum_progress": 0.0 <= self.minimum_progress < 1.0,
-            "progress_window": self.progress_window >= 1,
-            "maximum_seconds": self.maximum_seconds is None or self.maximum_seconds > 0.0,
-            "selection_patience": self.selection_patience is None or self.selection_patience >= 1,
-        }
-
-
-_KINDS = {int: "an integer", float: "a number", str: "a name", type(None): "null"}
-_NUMERIC = {int: numbers.Integral, float: numbers.Real}
-
-
-def _kinds(annotation: Any) -> tuple[type, ...]:
-    return get_args(annotation) or (annotation,)
-
-
-def _is_of(value: Any, annotation: Any) -> bool:
-    # bool is an int to Python
-    return not isinstance(value, bool) and any(
-        isinstance(value, _NUMERIC.get(kind, kind)) for kind in _kinds(annotation)
-    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,15 +1,14 @@
 """The one door to training: data and settings in, a network and its training record out.
 
-A new trainer is one file, with its settings and its `minimise`, and one entry of TRAINERS.
+A new trainer is its settings in parameters.trainers, a file with its `minimise`, and one entry of
+TRAINERS.
 """
 
-import functools
 import itertools
 import math
-import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -23,86 +22,33 @@ from flexik.learning import (
     levenberg_marquardt,
     regularised_cg,
 )
-from flexik.learning.accelerated import LevenbergMarquardtAccelerated
-from flexik.learning.adam import Adam
-from flexik.learning.back_propagation import BackPropagation
-from flexik.learning.lbfgs import Lbfgs
-from flexik.learning.levenberg_marquardt import LevenbergMarquardt
 from flexik.learning.perceptron import (
     ACTIVATIONS,
     Array,
+    Column,
     Network,
     Normalisation,
-    Quantity,
+    quantities,
 )
 from flexik.learning.problem import Problem, problem
-from flexik.learning.regularised_cg import RegularisedCg
-from flexik.learning.stopping import Minimum, Stopping, StopReason
+from flexik.learning.stopping import Minimum, StopReason
 from flexik.learning.weights import Weights, initial_weights, uniform_weights
+from flexik.parameters.trainers import Stopping
 
-__all__ = [
-    "TRAINERS",
-    "Adam",
-    "Architecture",
-    "BackPropagation",
-    "Lbfgs",
-    "LevenbergMarquardt",
-    "LevenbergMarquardtAccelerated",
-    "RegularisedCg",
-    "StopReason",
-    "Stopping",
-    "TrainingRecord",
-    "train",
-    "train_best",
-    "trainer_settings",
-]
-
+# Function of start, problem, settings and generator, by kind of settings
+TRAINERS: dict[str, Callable[..., Minimum]] = {
+    "levenberg_marquardt": levenberg_marquardt.minimise,
+    "levenberg_marquardt_accelerated": accelerated.minimise,
+    "back_propagation": back_propagation.minimise,
+    "adam": adam.minimise,
+    "lbfgs": lbfgs.minimise,
+    "regularised_cg": regularised_cg.minimise,
+}
 
 # Selection error of a network where the error of its outputs is not what counts
 Judge = Callable[[Network], float]
 # Sees the network of every iteration, the initial one first
 Observer = Callable[[Network], None]
-
-
-@dataclass(frozen=True)
-class Trainer:
-    """Settings of a trainer, and its function of start, problem, settings and generator."""
-
-    settings: type[Stopping]
-    minimise: Callable[[Weights, Problem, Any, np.random.Generator], Minimum]
-
-
-TRAINERS = {
-    "levenberg_marquardt": Trainer(LevenbergMarquardt, levenberg_marquardt.minimise),
-    "levenberg_marquardt_accelerated": Trainer(LevenbergMarquardtAccelerated, accelerated.minimise),
-    "back_propagation": Trainer(BackPropagation, back_propagation.minimise),
-    "adam": Trainer(Adam, adam.minimise),
-    "lbfgs": Trainer(Lbfgs, lbfgs.minimise),
-    "regularised_cg": Trainer(RegularisedCg, regularised_cg.minimise),
-}
-
-
-def trainer_settings(name: str, options: Mapping[str, Any] | None = None) -> Stopping:
-    """Settings of the trainer `name`; what `options` leave out keeps its default.
-
-    Raises
-    ------
-    TrainingError
-        When the trainer or an option is unknown, or a value of another type or out of range.
-    """
-    if name not in TRAINERS:
-        raise TrainingError(f"trainer {name!r} is unknown, expected one of {', '.join(TRAINERS)}")
-    settings = TRAINERS[name].settings
-    known = [setting.name for setting in fields(settings)]
-    for option in options or {}:
-        if option not in known:
-            raise TrainingError(
-                f"trainer {name}: option {option!r} is unknown, expected one of {', '.join(known)}"
-            )
-    try:
-        return settings(**(options or {}))
-    except TrainingError as error:
-        raise TrainingError(f"trainer {name}: {error}") from error
 
 
 @dataclass(frozen=True)
@@ -135,7 +81,7 @@ class TrainingRecord:
 
     Attributes
     ----------
-    trainer : name of the trainer
+    trainer : kind of the trainer
     seed, restart : the initial weights are drawn from the NumPy generator of (seed, restart)
     stop_reason : why the run ended
     errors : mean squared error of the normalised outputs per iteration, the first the initial
@@ -143,64 +89,40 @@ class TrainingRecord:
     kept : the iteration the network is of; the last one unless the errors rose or the settings
         asked for selection patience
     selection_error : root mean square of the normalised output errors on the selection data, or
-        what the judge of the run says
-    n_restarts : number of runs this one competed with, itself among them
-    seconds : wall time of the run; nan when read from a file, and no part of equality
+        what the judge of the run says; None where there is neither, or it is not finite
     """
 
     trainer: str
     seed: int
+    restart: int
     stop_reason: StopReason
     errors: tuple[float, ...]
     kept: int
     selection_error: float | None
-    restart: int
-    n_restarts: int
-    seconds: float = field(compare=False)
+
+    @property
+    def training_error(self) -> float:
+        """Root mean square of the normalised output errors; nan without a usable network."""
+        return math.sqrt(self.errors[self.kept]) if self.errors else math.nan
+
+    @property
+    def rank(self) -> float:
+        """Selection error, inf when there is none to compare."""
+        return math.inf if self.selection_error is None else self.selection_error
 
 
 @dataclass(frozen=True, eq=False)
-class _Task:
-    """What all restarts share."""
+class Lesson:
+    """What all restarts of a network share.
 
-    inputs: Array
-    outputs: Array
-    architecture: Architecture
-    settings: Stopping
-    seed: int
-    n_restarts: int
-    quantities: tuple[tuple[Quantity, ...], tuple[Quantity, ...]]
-    selection: tuple[Array, Array] | None
-    judge: Judge | None
-    observer: Observer | None = None
-    spread: float | None = None
-
-
-def train(
-    inputs: Array,
-    outputs: Array,
-    architecture: Architecture,
-    settings: Stopping,
-    seed: int,
-    input_quantities: Sequence[Quantity],
-    output_quantities: Sequence[Quantity],
-    selection: tuple[Array, Array] | None = None,
-    restart: int = 0,
-    judge: Judge | None = None,
-    observer: Observer | None = None,
-    spread: float | None = None,
-) -> tuple[Network, TrainingRecord]:
-    """Train one network; the same as restart `restart` of `train_best`.
-
-    Parameters
+    Attributes
     ----------
     inputs, outputs : (n, p) and (n, q) in physical units; their extremes give the normalisation
-    settings : of one of TRAINERS
-    seed : not negative
     input_quantities, output_quantities : names and units of the p and q columns
+    architecture, settings : of the network, and of one of TRAINERS
+    seed : not negative
     selection : inputs (m, p) and outputs (m, q) the training does not see, if any
     judge : gives the selection error, else that of the normalised outputs on `selection`
-    observer : called with the network of every iteration, as many as the record has errors
     spread : when given, the initial weights are uniform in [-spread, spread]; else they are those
         of Nguyen and Widrow
 
@@ -209,202 +131,216 @@ def train(
     DataError
         When the data are empty, not finite, or of shapes that do not belong together.
     TrainingError
-        When there are more weights than numbers to fit, selection patience without selection
-        data, or no usable network.
+        When there are more weights than numbers to fit, or patience without selection data.
     """
-    quantities = tuple(input_quantities), tuple(output_quantities)
-    data = _checked_pair("training", inputs, outputs, quantities)
-    if selection is not None:
-        selection = _checked_pair("selection", *selection, quantities)
-    elif settings.selection_patience is not None:
-        raise TrainingError("trainer setting selection_patience needs selection data")
-    task = _Task(
-        *data, architecture, settings, seed, 1, quantities, selection, judge, observer, spread
-    )
-    _check(task)
-    network, record = _run(task, restart)
+
+    inputs: Array
+    outputs: Array
+    input_quantities: Sequence[Column]
+    output_quantities: Sequence[Column]
+    architecture: Architecture
+    settings: Stopping
+    seed: int = 1
+    selection: tuple[Array, Array] | None = None
+    judge: Judge | None = None
+    spread: float | None = None
+
+    def __post_init__(self) -> None:
+        self._check_pair("training", self.inputs, self.outputs)
+        if self.selection is not None:
+            self._check_pair("selection", *self.selection)
+        elif self.settings.selection_patience is not None:
+            raise TrainingError("trainer setting selection_patience needs selection data")
+        if self.seed < 0:
+            raise TrainingError(f"seed={self.seed}, expected 0 or more")
+        n_weights = sum(
+            n_units * (n_before + 1) for n_before, n_units in itertools.pairwise(self.sizes)
+        )
+        if self.outputs.size < n_weights:
+            raise TrainingError(
+                f"{self.architecture.n_hidden} hidden units have {n_weights} weights, more than "
+                f"the {self.outputs.size} numbers ({len(self.outputs)} samples of "
+                f"{self.outputs.shape[1]} outputs) there are to fit"
+            )
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Units of all layers, inputs and outputs among them."""
+        hidden = self.architecture.hidden_sizes
+        return (self.inputs.shape[1], *hidden, self.outputs.shape[1])
+
+    @property
+    def kind(self) -> str:
+        """Kind of the trainer."""
+        if (kind := getattr(self.settings, "kind", "")) not in TRAINERS:
+            raise TrainingError(f"{type(self.settings).__name__} is not the settings of a trainer")
+        return str(kind)
+
+    @cached_property
+    def scales(self) -> tuple[Normalisation, Normalisation]:
+        """Of inputs and outputs."""
+        return Normalisation.from_data(self.inputs), Normalisation.from_data(self.outputs)
+
+    def network(self, weights: Weights) -> Network:
+        """The network of a copy of `weights`."""
+        copies = tuple(matrix.copy() for matrix in weights)
+        names = quantities(self.input_quantities), quantities(self.output_quantities)
+        activation = self.architecture.activation
+        return Network(copies, activation, *self.scales, tuple(names[0]), tuple(names[1]))
+
+    def _check_pair(self, role: str, inputs: Array, outputs: Array) -> None:
+        _check(f"{role} inputs", inputs, self.input_quantities)
+        _check(f"{role} outputs", outputs, self.output_quantities)
+        if len(inputs) != len(outputs):
+            raise DataError(f"{role} inputs have {len(inputs)} samples, outputs {len(outputs)}")
+
+
+def train(
+    lesson: Lesson, restart: int = 0, observer: Observer | None = None
+) -> tuple[Network, TrainingRecord]:
+    """The network of one restart; `observer` sees as many as the record has errors.
+
+    Raises TrainingError when there is no usable network.
+    """
+    network, record = attempt(lesson, restart, observer)
     if network is None:
-        raise _no_network(task, [record])
+        raise no_network(lesson, [record])
     return network, record
 
 
 def train_best(
-    inputs: Array,
-    outputs: Array,
-    selection_inputs: Array,
-    selection_outputs: Array,
-    architecture: Architecture,
-    settings: Stopping,
-    seed: int,
-    n_restarts: int,
-    input_quantities: Sequence[Quantity],
-    output_quantities: Sequence[Quantity],
-    map_function: Callable[[Callable, Iterable], Iterable] = map,
-    judge: Judge | None = None,
+    lesson: Lesson, n_restarts: int
 ) -> tuple[Network, TrainingRecord, list[TrainingRecord]]:
-    """Train from `n_restarts` starts and keep the network with the least selection error.
+    """Train from `n_restarts` starts, one after the other, and keep the best by selection error.
 
     Rare restarts generalise badly, so the training error does not choose.
 
-    Parameters
-    ----------
-    inputs, outputs : (n, p) and (n, q) in physical units; their extremes give the normalisation
-    selection_inputs, selection_outputs : (m, p) and (m, q), data the training does not see
-    seed : restart k starts from the NumPy generator of (seed, k)
-    settings : of one of TRAINERS
-    map_function : ``map_function(function, items)`` gives the results in any order; `function`
-        can be pickled, so it may run in other processes without changing the result
-    judge : as for `train`
-
     Returns
     -------
-    network, record : the chosen network and its record
+    network, record : of the chosen restart
     records : of all restarts in their order; one that failed has no errors and no selection error
 
     Raises
     ------
-    DataError, TrainingError
-        As `train`, the latter when every restart fails.
+    TrainingError
+        When every restart fails.
     """
-    if n_restarts < 1:
-        raise TrainingError(f"n_restarts={n_restarts}, expected at least 1")
-    quantities = tuple(input_quantities), tuple(output_quantities)
-    data = _checked_pair("training", inputs, outputs, quantities)
-    selection = _checked_pair("selection", selection_inputs, selection_outputs, quantities)
-    task = _Task(*data, architecture, settings, seed, n_restarts, quantities, selection, judge)
-    _check(task)
-    runs = sorted(
-        map_function(functools.partial(_run, task), range(n_restarts)),
-        key=lambda run: run[1].restart,
-    )
+    return best(lesson, [attempt(lesson, restart) for restart in range(n_restarts)])
+
+
+def best(
+    lesson: Lesson, runs: Sequence[tuple[Network | None, TrainingRecord]]
+) -> tuple[Network, TrainingRecord, list[TrainingRecord]]:
+    """As `train_best`, of restarts that were made before, in their order."""
     records = [record for _, record in runs]
     # min keeps the first of equals, that is the lowest restart
-    network, record = min(runs, key=_selection_error)
-    if network is None or math.isinf(_selection_error((network, record))):
-        raise _no_network(task, records)
+    network, record = min(runs, key=lambda run: run[1].rank, default=(None, None))
+    if network is None or record is None or math.isinf(record.rank):
+        raise no_network(lesson, records)
     return network, record, records
 
 
-def _run(task: _Task, restart: int) -> tuple[Network | None, TrainingRecord]:
-    started = time.perf_counter()
-    name, trainer = _trainer(task.settings)
-    normalisations = Normalisation.from_data(task.inputs), Normalisation.from_data(task.outputs)
-    generator = np.random.default_rng((task.seed, restart))
-    sizes = task.inputs.shape[1], task.architecture.hidden_sizes, task.outputs.shape[1]
-    if task.spread is None:
-        start = initial_weights(*sizes, task.architecture.activation, generator)
-    else:
-        start = uniform_weights(*sizes, task.spread, generator)
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """A restart of a lesson; `observer` sees the network of every iteration."""
+
+    lesson: Lesson
+    restart: int
+    observer: Observer | None = None
+
+    def begin(self) -> tuple[Weights, Problem, Stopping, np.random.Generator]:
+        """What a trainer takes."""
+        lesson, (first, *hidden, last) = self.lesson, self.lesson.sizes
+        generator = np.random.default_rng((lesson.seed, self.restart))
+        if lesson.spread is None:
+            activation = lesson.architecture.activation
+            start = initial_weights(first, hidden, last, activation, generator)
+        else:
+            start = uniform_weights(first, hidden, last, lesson.spread, generator)
+        watch = self.observer
+        observe = None if watch is None else lambda weights: watch(lesson.network(weights))
+        return start, _problem(lesson, observe), lesson.settings, generator
+
+    def end(self, minimum: Minimum) -> tuple[Network | None, TrainingRecord]:
+        """The network, None where it is not usable, and its record."""
+        lesson = self.lesson
+        network = lesson.network(minimum.weights) if minimum.errors else None
+        error = math.nan if network is None else _selection_error(lesson, network)
+        made = lesson.kind, lesson.seed, self.restart, minimum.stop_reason, minimum.errors
+        return network, TrainingRecord(*made, minimum.kept, error if math.isfinite(error) else None)
+
+
+def attempt(
+    lesson: Lesson, restart: int, observer: Observer | None = None
+) -> tuple[Network | None, TrainingRecord]:
+    """As `train`; None in place of a network that is not usable."""
+    return attempt_together([Attempt(lesson, restart, observer)])[0]
+
+
+def attempt_together(
+    attempts: Sequence[Attempt],
+) -> list[tuple[Network | None, TrainingRecord]]:
+    """As `attempt`, of lessons of one architecture, kind of trainer and number of samples.
+
+    Back-propagation takes the steps of all at once; others learn one after the other.
+    """
+    kinds = {each.lesson.kind for each in attempts}
     # the order of sums in a product depends on the number of threads, so it is one everywhere
     with threadpool_limits(1):
-        minimum = trainer.minimise(start, _problem(task, normalisations), task.settings, generator)
-    record = TrainingRecord(
-        trainer=name,
-        seed=task.seed,
-        stop_reason=minimum.stop_reason,
-        errors=minimum.errors,
-        kept=minimum.kept,
-        selection_error=None,
-        restart=restart,
-        n_restarts=task.n_restarts,
-        seconds=time.perf_counter() - started,
+        begun = [each.begin() for each in attempts]
+        if kinds == {"back_propagation"}:
+            minima = back_propagation.minimise_together(*zip(*begun, strict=True))
+        else:
+            minima = [
+                TRAINERS[each.lesson.kind](*given)
+                for each, given in zip(attempts, begun, strict=True)
+            ]
+    return [each.end(minimum) for each, minimum in zip(attempts, minima, strict=True)]
+
+
+def no_network(lesson: Lesson, records: Sequence[TrainingRecord]) -> TrainingError:
+    """What to raise when no restart gave a usable network."""
+    outputs = ", ".join(quantity.name for quantity in lesson.output_quantities)
+    reasons = ", ".join(f"{record.restart}: {record.stop_reason}" for record in records)
+    shape = f"{lesson.architecture.n_hidden} {lesson.architecture.activation} units"
+    return TrainingError(
+        f"network for {outputs} with {shape}, seed {lesson.seed}: no usable network, restarts "
+        f"ended with {reasons}"
     )
-    if not minimum.errors:
-        return None, record
-    network = _network(task, minimum.weights, normalisations)
-    if task.judge is not None:
-        record = replace(record, selection_error=task.judge(network))
-    elif task.selection is not None:
-        values, expected = (task.selection[0], normalisations[1].to_unit(task.selection[1]))
-        residuals = normalisations[1].to_unit(network.predict(values)) - expected
-        record = replace(record, selection_error=float(np.sqrt(np.mean(residuals**2))))
-    return network, record
 
 
-def _network(
-    task: _Task, weights: Weights, normalisations: tuple[Normalisation, Normalisation]
-) -> Network:
-    copies = tuple(matrix.copy() for matrix in weights)
-    return Network(copies, task.architecture.activation, *normalisations, *task.quantities)
+def _selection_error(lesson: Lesson, network: Network) -> float:
+    if lesson.judge is not None:
+        return lesson.judge(network)
+    if lesson.selection is None:
+        return math.nan
+    inputs, outputs = lesson.selection
+    to_unit = network.output_normalisation.to_unit
+    residuals = to_unit(network.predict(inputs)) - to_unit(outputs)
+    return float(np.sqrt(np.mean(residuals**2)))
 
 
-def _trainer(settings: Stopping) -> tuple[str, Trainer]:
-    for name, trainer in TRAINERS.items():
-        if type(settings) is trainer.settings:
-            return name, trainer
-    raise TrainingError(f"{type(settings).__name__} is not the settings of a trainer")
-
-
-def _problem(task: _Task, normalisations: tuple[Normalisation, Normalisation]) -> Problem:
+def _problem(lesson: Lesson, observe: Callable[[Weights], None] | None) -> Problem:
     def unit(inputs: Array, outputs: Array) -> tuple[Array, Array]:
-        return normalisations[0].to_unit(inputs), normalisations[1].to_unit(outputs)
+        return lesson.scales[0].to_unit(inputs), lesson.scales[1].to_unit(outputs)
 
     # the trainer sees the selection data only to stop by them
-    asked = task.settings.selection_patience is not None
-    selection = unit(*task.selection) if asked and task.selection is not None else None
-    watch, data = task.observer, unit(task.inputs, task.outputs)
-
-    def observe(weights: Weights) -> None:
-        if watch is not None:
-            watch(_network(task, weights, normalisations))
-
-    return problem(task.architecture.activation, *data, selection, observe if watch else None)
+    asked = lesson.settings.selection_patience is not None
+    selection = unit(*lesson.selection) if asked and lesson.selection is not None else None
+    data = unit(lesson.inputs, lesson.outputs)
+    return problem(lesson.architecture.activation, *data, selection, observe)
 
 
-def _selection_error(run: tuple[Network | None, TrainingRecord]) -> float:
-    error = run[1].selection_error
-    return math.inf if error is None or math.isnan(error) else error
-
-
-def _no_network(task: _Task, records: list[TrainingRecord]) -> TrainingError:
-    outputs = ", ".join(quantity.name for quantity in task.quantities[1])
-    reasons = ", ".join(f"{record.restart}: {record.stop_reason}" for record in records)
-    return TrainingError(
-        f"network for {outputs} with {task.architecture.n_hidden} {task.architecture.activation} "
-        f"units, seed {task.seed}: no usable network, restarts ended with {reasons}"
-    )
-
-
-def _checked_pair(
-    role: str,
-    inputs: Array,
-    outputs: Array,
-    quantities: tuple[tuple[Quantity, ...], tuple[Quantity, ...]],
-) -> tuple[Array, Array]:
-    pair = (
-        _checked(f"{role} inputs", inputs, quantities[0]),
-        _checked(f"{role} outputs", outputs, quantities[1]),
-    )
-    if len(pair[0]) != len(pair[1]):
-        raise DataError(f"{role} inputs have {len(pair[0])} samples, outputs {len(pair[1])}")
-    return pair
-
-
-def _checked(role: str, values: Array, quantities: tuple[Quantity, ...]) -> Array:
-    values = np.asarray(values, dtype=np.float64)
-    names = ", ".join(quantity.name for quantity in quantities)
-    if values.ndim != 2 or 0 in values.shape or values.shape[1] != len(quantities):
+def _check(role: str, values: Array, columns: Sequence[Column]) -> None:
+    names = ", ".join(column.name for column in columns)
+    if values.ndim != 2 or 0 in values.shape or values.shape[1] != len(columns):
         raise DataError(
-            f"{role} have shape {values.shape}, expected (n, {len(quantities)}), n > 0: {names}"
+            f"{role} have shape {values.shape}, expected (n, {len(columns)}), n > 0: {names}"
         )
     bad = np.argwhere(~np.isfinite(values))
     if bad.size:
         sample, column = bad[0]
         raise DataError(
-            f"{role}, sample {sample}: {quantities[column].name} is "
+            f"{role}, sample {sample}: {columns[column].name} is "
             f"{values[sample, column]}, expected a finite number"
-        )
-    return values
-
-
-def _check(task: _Task) -> None:
-    if task.seed < 0:
-        raise TrainingError(f"seed={task.seed}, expected 0 or more")
-    n_outputs, n_hidden = task.outputs.shape[1], task.architecture.n_hidden
-    sizes = (task.inputs.shape[1], *task.architecture.hidden_sizes, n_outputs)
-    n_weights = sum(n_units * (n_before + 1) for n_before, n_units in itertools.pairwise(sizes))
-    if task.outputs.size < n_weights:
-        raise TrainingError(
-            f"{n_hidden} hidden units have {n_weights} weights, more than the {task.outputs.size} "
-            f"numbers ({len(task.outputs)} samples of {n_outputs} outputs) there are to fit"
         )
