@@ -1,37 +1,102 @@
-"""The table of all cases in the README."""
+"""The blocks of README.md: the table of all cases, and named blocks in general."""
 
-from flexik.reporting.overview import ABSENT, ENTRIES, NOT_AVAILABLE, overview
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
-JOINTS = {f"config{c}.joint{k}_error_percent": float(c * k) for c in (1, 2) for k in range(1, 7)}
-METRICS = {
-    case: {entry.metric: 0.001 for entry in ENTRIES if entry.case == case}
-    for case in ("crane", "elastic_arm", "smartee")
-} | {"fanuc": JOINTS}
-PUBLISHED = {
-    entry.published: 0.003 for entry in ENTRIES if entry.published not in (None, NOT_AVAILABLE)
-}
+from flexik.errors import DataError
+from flexik.files import write_json
+from flexik.reporting import overview
+from flexik.reporting.overview import ABSENT, replace_block, update
+
+TEXT = st.text(st.characters(codec="utf-8", exclude_characters="\r"))
+NAME = st.from_regex(r"[a-z][a-z-]{0,10}", fullmatch=True)
 
 
-def cells(table, what):
-    (row,) = (line for line in table.splitlines() if f" {what} " in line)
+def block(name, content):
+    return f"<!-- flexik:{name} -->{content}<!-- /flexik:{name} -->"
+
+
+@given(TEXT, TEXT, TEXT, TEXT, NAME)
+def test_only_the_block_changes(before, old, after, new, name):
+    assume(not any("flexik:" in part for part in (before, old, after, new)))
+    text = before + block(name, old) + after
+    once = replace_block(text, name, new)
+    assert once.startswith(f"{before}<!-- flexik:{name} -->\n")
+    assert once.endswith(f"\n<!-- /flexik:{name} -->{after}")
+    inside = once.removeprefix(f"{before}<!-- flexik:{name} -->")
+    inside = inside.removesuffix(f"<!-- /flexik:{name} -->{after}")
+    assert inside.strip("\n") == new.strip("\n")
+    assert replace_block(once, name, new) == once
+
+
+@given(TEXT, TEXT)
+def test_other_blocks_stay(first, second):
+    assume("flexik:" not in first + second)
+    text = block("a", "") + block("b", "kept")
+    changed = replace_block(replace_block(text, "a", first), "b", second)
+    swapped = replace_block(replace_block(text, "b", second), "a", first)
+    assert changed == swapped
+    assert replace_block(text, "a", first).endswith(block("b", "kept"))
+
+
+@pytest.mark.parametrize(
+    ("text", "new", "message"),
+    [
+        ("nothing", "x", r"<!-- flexik:errors --> once, found it 0 times"),
+        ("<!-- flexik:errors -->", "x", r"<!-- /flexik:errors --> once, found it 0 times"),
+        (block("errors", "") * 2, "x", r"found it 2 times"),
+        ("<!-- /flexik:errors --> <!-- flexik:errors -->", "x", r"<!-- /flexik:errors --> after"),
+        (block("errors", ""), "<!-- /flexik:errors -->", r"holds the marker"),
+        (block("other", ""), "x", r"flexik:errors"),
+    ],
+)
+def test_wrong_markers_are_named(text, new, message):
+    with pytest.raises(DataError, match=message):
+        replace_block(text, "errors", new)
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """Make a case of two rows, a published value and a table."""
+    for name, folder in (("REPORTS", "reports"), ("REFERENCE", "reference"), ("CASES", "cases")):
+        (tmp_path / folder / "arm").mkdir(parents=True)
+        monkeypatch.setattr(overview, name, tmp_path / folder)
+    rows = [
+        "case,what,metric,form,scale,published",
+        "[arm](x.md),peak (mrad),net.peak_rad,.2f,1000,peaks.csv elbow peak 1000",
+        "[arm](x.md),mean of joints (%),joint*_percent,.1f,1,not available",
+    ]
+    (tmp_path / "cases/arm/overview.csv").write_text("\n".join(rows))
+    (tmp_path / "reference/arm/peaks.csv").write_text("quantity,unit,peak\nelbow,rad,3e-3\n")
+    (tmp_path / "reports/arm/errors.md").write_text("| a |\n")
+    metrics = {"net.peak_rad": 0.00177, "joint1_percent": 1.0, "joint2_percent": 2.0}
+    write_json(tmp_path / "reports/arm/metrics.json", metrics)
+    readme = tmp_path / "README.md"
+    readme.write_text(block("overview", "old") + block("arm/errors", "old"))
+    return readme
+
+
+def cells(text, what):
+    (row,) = (line for line in text.splitlines() if f" {what} " in line)
     return [cell.strip() for cell in row.strip("|").split("|")][2:]
 
 
-def test_values_stand_beside_the_published_in_the_unit_of_the_row():
-    table = overview(METRICS, PUBLISHED)
-    assert cells(table, "peak elbow error (mrad)") == ["3", "1.00"]
-    assert cells(table, "mean error, `combined` (mm)") == ["0.003", "0.00"]
-    assert cells(table, "mean tip error without gauges, `combined` (mm)") == ["", "0.00"]
-    # means over the joints: 3.5 and 7
-    one, all_ = "one network a joint", "one network for all"
-    assert cells(table, f"total error of the joints, {one} (%)") == [NOT_AVAILABLE, "3.50"]
-    assert cells(table, f"total error of the joints, {all_} (%)") == [NOT_AVAILABLE, "7.00"]
-    assert len(table.strip().splitlines()) == 2 + len(ENTRIES)
+def test_values_stand_beside_the_published_in_the_unit_of_the_row(project):
+    update(project)
+    text = project.read_text()
+    assert cells(text, "peak (mrad)") == ["3", "1.77"]
+    assert cells(text, "mean of joints (%)") == ["not available", "1.5"]
+    assert "| a |" in text and "old" not in text
 
 
-def test_a_metric_that_a_run_lacks_is_told():
-    fewer = {name: value for name, value in JOINTS.items() if "config1.joint6" not in name}
-    table = overview(METRICS | {"fanuc": fewer}, PUBLISHED)
-    one, all_ = "one network a joint", "one network for all"
-    assert cells(table, f"total error of the joints, {one} (%)") == [NOT_AVAILABLE, ABSENT]
-    assert cells(table, f"total error of the joints, {all_} (%)") == [NOT_AVAILABLE, "7.00"]
+def test_a_metric_that_a_run_lacks_is_told(project):
+    write_json(project.with_name("reports") / "arm/metrics.json", {})
+    update(project)
+    assert cells(project.read_text(), "peak (mrad)") == ["3", ABSENT]
+
+
+def test_a_missing_table_is_named(project):
+    (project.with_name("reports") / "arm/errors.md").unlink()
+    with pytest.raises(DataError, match=r"errors\.md"):
+        update(project)

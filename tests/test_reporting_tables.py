@@ -1,7 +1,5 @@
 """Tables against values worked out by hand."""
 
-import io
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,32 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flexik.errors import DataError
-from flexik.evaluation.errors import STATISTICS
-from flexik.reporting.tables import (
-    calibration_table,
-    markdown,
-    mesh_table,
-    positioning_errors_table,
-    write_table,
-)
-
-OURS = {
-    "max_abs_dx": 0.05,
-    "max_abs_dy": 0.1,
-    "max_error": 0.11,
-    "mean_abs_dx": 0.01,
-    "mean_abs_dy": 0.02,
-    "mean_error": 0.03,
-    "n_conditions": 125,
-    "n_failed": 2,
-}
-
-
-@pytest.fixture
-def published():
-    return pd.DataFrame(
-        {"statistic": list(STATISTICS), "none": [40.0, 125, 88, 8, 25, 40], "combined": range(1, 7)}
-    )
+from flexik.reporting.tables import Column, Table, markdown, mm, table, write_table
 
 
 def test_markdown_of_numbers_texts_and_nothing():
@@ -105,71 +78,19 @@ def test_every_row_of_markdown_has_the_same_cells(values, names):
         assert abs(float(line.split("|")[-2]) - value) <= 0.005 * (1 + 1e-9)
 
 
-def test_positioning_errors_stand_beside_the_published_ones(published):
-    table = positioning_errors_table(
-        {"none": OURS, "combined_ga": OURS | {"mean_error": 0.004, "n_failed": 0}},
-        published,
-        {"combined_ga": "combined"},
-    )
-    assert list(table.columns) == [
-        *("statistic", "none", "none published", "combined_ga", "combined_ga published")
-    ]
-    assert table["statistic"].tolist() == [
-        *("max |dX| (mm)", "max |dY| (mm)", "max R (mm)"),
-        *("mean |dX| (mm)", "mean |dY| (mm)", "mean R (mm)"),
-        *("conditions", "failed conditions"),
-    ]
-    assert table["none"].tolist()[:6] == pytest.approx([50, 100, 110, 10, 20, 30])
-    assert table["none"].tolist()[6:] == [125, 2]
-    assert table["combined_ga"].tolist()[5] == pytest.approx(4.0)
-    assert table["combined_ga published"].tolist() == [1, 2, 3, 4, 5, 6, None, None]
-    last = markdown(table).splitlines()[-2:]
-    assert [cell.strip() for cell in last[0].split("|")] == [
-        "",
-        "conditions",
-        "125",
-        "",
-        "125",
-        "",
-        "",
-    ]
-    table = positioning_errors_table({"mine": OURS}, published, {"mine": None})
-    assert table["mine"].tolist()[5] == pytest.approx(30.0)
-    row = next(line for line in markdown(table).splitlines() if "mean R" in line)
-    assert [cell.strip() for cell in row.split("|")] == ["", "mean R (mm)", "30.00", "", ""]
-    less = {key: value for key, value in OURS.items() if key != "n_failed"}
-    with pytest.raises(DataError, match="n_failed"):
-        positioning_errors_table({"none": less}, published)
+def test_a_table_of_columns_in_their_units():
+    rows = [{"method": "a", "mean_error": 0.0012345, "n": 3}, {"method": "b", "n": 4}]
+    made = table(rows, {"method": "method", "mean (mm)": mm("mean_error", 1), "n": "n"})
+    assert made.csv == "method,mean (mm),n\na,1.2345,3\nb,,4\n"
+    assert "| a      |       1.2 |   3 |" in made.markdown()
+    assert table([], {"method": "method", "n": Column("n", 0)}).csv == "method,n\n"
+    with pytest.raises(DataError, match="'p95'"):
+        table(rows, {"p95": mm("p95")})
 
 
-def test_calibration_differs_in_percent_of_the_published(published):
-    table = calibration_table(OURS, published)
-    assert table["difference (%)"].tolist() == pytest.approx([25, -20, 25, 25, -20, -25])
-    assert table["ours"].tolist() == pytest.approx([50, 100, 110, 10, 20, 30])
-    assert len(table) == 6
-
-
-def test_mesh_table_is_in_mm_and_keeps_other_columns():
-    frame = pd.DataFrame(
-        {
-            "refinement": [1, 2],
-            "max_difference": [2e-4, 5e-5],
-            "element": ["ancf", "ancf"],
-            "mean_difference": [1e-4, 2e-5],
-        },
-        index=[5, 6],
-    )
-    table = mesh_table(frame)
-    names = ["refinement", "max tip difference (mm)", "element", "mean tip difference (mm)"]
-    assert list(table.columns) == names
-    np.testing.assert_allclose(table[names[1::2]], [[0.2, 0.1], [0.05, 0.02]])
-    assert frame["mean_difference"].tolist() == [1e-4, 2e-5]
-    with pytest.raises(DataError, match="max_difference"):
-        mesh_table(frame.drop(columns="max_difference"))
-
-
-def test_csv_reads_back(tmp_path, published):
-    write_table(tmp_path / "errors", positioning_errors_table({"none": OURS}, published))
-    read = pd.read_csv(io.StringIO((tmp_path / "errors.csv").read_text()))
-    assert read["none"].tolist() == [50, 100, 110, 10, 20, 30, 125, 2]
-    assert read["none published"].isna().tolist() == [False] * 6 + [True] * 2
+def test_files_of_a_table_are_those_that_write_table_makes(tmp_path):
+    frame = pd.DataFrame({"x": [np.pi], "n": [2]})
+    write_table(tmp_path / "t", frame, {"x": 1}, "Caption.", ["note"])
+    made = Table(frame, {"x": 1})
+    assert (tmp_path / "t.csv").read_text() == made.csv
+    assert (tmp_path / "t.md").read_text() == made.markdown("Caption.", ["note"])

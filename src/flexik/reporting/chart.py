@@ -6,7 +6,7 @@ A chart is a list of layers over tidy frames; a column names the panel of a row,
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -25,9 +25,9 @@ from flexik.reporting.style import Look
 Array = NDArray[np.float64]
 
 SPAN = 1e5  # greatest over least value of a logarithmic axis; what is less is drawn as the least
-LEGEND_CHARACTERS = 92  # of a line of the legend
-TITLE_CHARACTERS = 92  # of the titles of a row of panels
+CHARACTERS = 92  # of a line of the legend, and of the titles of a row of panels
 HALO = [withStroke(linewidth=3, foreground="white")]
+LEADER = {"arrowstyle": "-", "color": style.GREY, "linewidth": 0.8, "shrinkB": 0}
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,12 @@ class Axis:
     """One axis of a panel.
 
     label : quantity and unit, "error (mm)".
-    scale : factor from the column to that unit.
-    log, linear_below : logarithmic; linear below this value (in the unit), also of negative ones.
-    least : smaller values are drawn as this (in the unit); default: the greatest over SPAN.
-    limits : in the unit; None leaves an end to the data.
-    margin : about the data, as a share of its extent.
+    scale : factor from the column to that unit, in which the others are.
+    log, linear_below : logarithmic; linear below this value, also of negative numbers.
+    least : smaller values are drawn as this; default of a logarithmic axis: the greatest over SPAN.
+    limits : None leaves an end to the data.
     ticks : values, or texts by value.
+    margin : about the data, as a share of its extent.
     """
 
     label: str = ""
@@ -62,7 +62,8 @@ class Layer:
     frame : tidy; without the chart's panel column it is drawn in every panel.
     x, y : names of columns.
     mark : "-", "--", "o", "o-", "." and so on as in Axes.plot; "steps"; "band" between the columns
-        y and `to`; "bars" of `width`; "area" filled; "text" of the column `text`.
+        y and `to`; "bars" of `width`; "area" filled; "text" of the column `text`, at dx and dy
+        points, side, with a line to it if the look has leader=True.
     hue : column whose values have colours (chart's `looks`) and entries in the legend.
     group : column whose values are lines of their own.
     label : entry of the legend; with a hue "{}" stands for its value, "" leaves it out.
@@ -84,9 +85,9 @@ class Layer:
 
 @dataclass(frozen=True)
 class Rule:
-    """A straight line at `value` (in the unit of the axis) across the `panel`, or all of them."""
+    """A straight line at `value` (in the unit) of axis "x" or "y", in one `panel` or all."""
 
-    axis: Literal["x", "y"]
+    axis: str
     value: float
     label: str = ""
     look: Look = field(default_factory=lambda: style.PUBLISHED)
@@ -99,7 +100,7 @@ def chart(
     y: Axis | Mapping[Any, Axis],
     panel: str | None = None,
     panels: Sequence[Any] | None = None,
-    titles: Mapping[Any, str] | str | None = None,
+    titles: Mapping[Any, str] | str = "",
     looks: Mapping[Any, Look] | None = None,
     rules: Sequence[Rule] = (),
     columns: int = 3,
@@ -110,96 +111,59 @@ def chart(
     equal: bool = False,
     legend: str = "",
 ) -> Figure:
-    """Draw layers in panels, a legend above all.
+    """Draw layers, the first below the others, in panels, a legend above all.
 
-    Parameters
-    ----------
-    layers
-        What to draw, the first below the others.
-    x, y
-        Axes, of all panels or by panel.
-    panel, panels
-        Column that tells the panel of a row; the panels in order, by default as they come.
-    titles
-        By panel (default: its name, "" for none); a text: title of the only panel.
-    looks
-        Colour, line and marker by value of a hue, see style.looks.
-    rules
-        Straight lines.
-    columns, width, height, widths
-        Panels in a row; size of the figure in inches; relative widths of the columns.
-    share
-        "x", "y", "xy" or "": axes that all panels have in common.
-    equal
-        One scale for x and y: a plane.
-    legend
-        Heading of the legend.
+    x, y : axes, of all panels or by panel.
+    panel, panels : column that tells the panel of a row; the panels in order, as they come if None.
+    titles : by panel (default: its name, "" for none), or of the only one.
+    looks : colour, line and marker by value of a hue, see style.looks.
+    columns, width, height, widths : panels in a row; inches; relative widths of the columns.
+    share : "x", "y", "xy" or "": axes that all panels have in common.
+    equal : one scale for x and y.
+    legend : its heading.
 
-    Raises
-    ------
-    DataError
-        If a layer has no row, lacks a column, or nothing of it is finite.
+    Raises DataError if a layer lacks a column, is infinite, or has no finite row.
     """
     for layer in layers:
-        _check(layer, panel)
+        _check(layer)
     names = [None] if panel is None else list(panels or _values(layers, panel))
-    if not isinstance(titles, Mapping):
-        titles = dict.fromkeys(names, titles or "") if panel is None else {}
-    looks = {**_looks_of(layers), **(looks or {})}
     columns = min(columns, len(names))
     rows = -(-len(names) // columns)
-    size = (width, height or (1.1 + (4.0 if rows * columns == 1 else 2.5) * rows))
-    figure = Figure(figsize=size)
-    grid = figure.subplots(
-        *(rows, columns),
-        sharex="x" in share,
-        sharey="y" in share,
-        squeeze=False,
-        width_ratios=widths,
-    ).ravel()
-    of_panel = [_axis(x, name) for name in names], [_axis(y, name) for name in names]
-    # one label for all panels in a row or column
-    one = columns > 1 and isinstance(x, Axis), rows > 1 and isinstance(y, Axis)
-    for k, (axes, name) in enumerate(zip(grid, names, strict=False)):
-        scales, inside = (of_panel[0][k], of_panel[1][k]), [_rows(la, panel, name) for la in layers]
-        drawn = [list(zip(layers, inside, strict=True)), [(la, la.frame) for la in layers]]
-        least = [_least(drawn[isinstance(x, Axis)], "x"), _least(drawn[isinstance(y, Axis)], "y")]
-        for layer, rows_of in zip(layers, inside, strict=True):
-            if len(rows_of):
-                _draw(axes, layer, rows_of, scales, least, looks)
+    height = height or 1.1 + (4.0 if len(names) == 1 else 2.5) * rows
+    figure = Figure(figsize=(width, height))
+    options: dict[str, Any] = {"squeeze": False, "width_ratios": widths}
+    grid = figure.subplots(rows, columns, sharex="x" in share, sharey="y" in share, **options)
+    hues = {value: None for layer in layers if layer.hue for value in layer.frame[layer.hue]}
+    looks = {**style.looks(hues), **(looks or {})}
+    for axes, name in zip(grid.ravel(), names, strict=False):
+        inside = [(la, _inside(la, panel, name)) for la in layers]
+        axes_of = [a if isinstance(a, Axis) else a[name] for a in (x, y)]
+        # one axis of all panels begins where all of their data does
+        every = [(la, la.frame) for la in layers]
+        seen = [every if isinstance(a, Axis) else inside for a in (x, y)]
+        least = [_least(drawn, which) for drawn, which in zip(seen, "xy", strict=True)]
+        for layer, frame in inside:
+            _draw(axes, layer, frame, axes_of, least, looks)
         for rule in rules:
-            if rule.panel is None or rule.panel == name:
+            if rule.panel in (None, name):
                 line = axes.axvline if rule.axis == "x" else axes.axhline
                 line(rule.value, label=rule.label or None, zorder=1.6, **rule.look)
-        title = titles.get(name, "" if name is None else str(name))
-        wrapped = (textwrap.fill(line, TITLE_CHARACTERS // columns) for line in title.splitlines())
-        axes.set_title("\n".join(wrapped))
-        if equal:
-            axes.set_aspect("equal", adjustable="box")
-    for k, axes in enumerate(grid):
-        if k >= len(names):
-            axes.set_axis_off()
-            continue
-        below = k + columns < len(names)
-        axes.xaxis.set_tick_params(labelbottom="x" not in share or not below)
-        _set_axis(axes, of_panel[0][k], "x", one[0] or (below and "x" in share))
-        _set_axis(axes, of_panel[1][k], "y", one[1] or (k % columns > 0 and "y" in share))
-    if one[0]:
-        figure.supxlabel(of_panel[0][0].label, fontsize=10)
-    if one[1]:
-        figure.supylabel(of_panel[1][0].label, fontsize=10)
-    _legend(figure, grid[: len(names)], legend)
+        title = titles if isinstance(titles, str) else titles.get(name, str(name))
+        title = str(name) if panel is not None and titles == "" else title
+        lines = (textwrap.fill(line, CHARACTERS // columns) for line in title.splitlines())
+        axes.set(title="\n".join(lines), **({"aspect": "equal"} if equal else {}))
+    _set_all(figure, grid, names, (x, y), share)
+    _legend(figure, legend)
     return figure
 
 
-def _check(layer: Layer, panel: str | None) -> None:
+def _check(layer: Layer) -> None:
     needed = [layer.x, layer.y, layer.hue, layer.group, layer.to, layer.text]
-    style.require(f"layer {layer.label or layer.y}", layer.frame.columns, filter(None, needed))
+    what = f"layer {layer.label or layer.y}"
+    style.require(what, layer.frame.columns, filter(None, needed))
     values = layer.frame[[layer.x, layer.y]].to_numpy(dtype=float)
-    if not np.isfinite(values).all(axis=1).any():
-        raise DataError(f"layer {layer.label or layer.y}: expected finite numbers, found none")
-    if np.isinf(values).any():
-        raise DataError(f"layer {layer.label or layer.y}: a number is infinite")
+    if np.isinf(values).any() or not np.isfinite(values).all(axis=1).any():
+        raise DataError(f"{what}: expected finite numbers")
 
 
 def _values(layers: Iterable[Layer], column: str) -> list[Any]:
@@ -207,29 +171,19 @@ def _values(layers: Iterable[Layer], column: str) -> list[Any]:
     return list(dict.fromkeys(value for frame in frames for value in frame[column]))
 
 
-def _looks_of(layers: Iterable[Layer]) -> dict[Any, dict[str, Any]]:
-    hues = (v for layer in layers if layer.hue for v in layer.frame[layer.hue])
-    return style.looks(dict.fromkeys(hues))
+def _inside(layer: Layer, panel: str | None, name: Any) -> pd.DataFrame:
+    everywhere = panel is None or panel not in layer.frame
+    return layer.frame if everywhere else layer.frame[layer.frame[panel] == name]
 
 
-def _axis(axis: Axis | Mapping[Any, Axis], name: Any) -> Axis:
-    return axis if isinstance(axis, Axis) else axis[name]
-
-
-def _rows(layer: Layer, panel: str | None, name: Any) -> pd.DataFrame:
-    if panel is None or panel not in layer.frame:
-        return layer.frame
-    return layer.frame[layer.frame[panel] == name]
-
-
-def _least(drawn: Iterable[tuple[Layer, pd.DataFrame]], which: Literal["x", "y"]) -> float:
+def _least(drawn: Iterable[tuple[Layer, pd.DataFrame]], which: str) -> float:
     """Least value drawn on a logarithmic axis without one of its own, in the unit of the column."""
-    found = [
+    numbers = [
         rows[name].to_numpy(dtype=float)
         for layer, rows in drawn
-        for name in ((layer.x,) if which == "x" else filter(None, (layer.y, layer.to)))
+        for name in ([layer.x] if which == "x" else filter(None, (layer.y, layer.to)))
     ]
-    values = np.concatenate(found)
+    values = np.concatenate(numbers)
     positive = values[np.isfinite(values) & (values > 0)]
     if not positive.size:
         return 1.0
@@ -238,7 +192,7 @@ def _least(drawn: Iterable[tuple[Layer, pd.DataFrame]], which: Literal["x", "y"]
 
 def _place(values: pd.Series, axis: Axis, least: float) -> Array:
     numbers = axis.scale * values.to_numpy(dtype=float)
-    if axis.least is not None or (axis.log and axis.linear_below is None):
+    if axis.least is not None or axis.log:
         numbers = np.maximum(numbers, axis.scale * least if axis.least is None else axis.least)
     return numbers
 
@@ -246,40 +200,37 @@ def _place(values: pd.Series, axis: Axis, least: float) -> Array:
 def _draw(
     axes: Axes,
     layer: Layer,
-    rows: pd.DataFrame,
-    scales: tuple[Axis, Axis],
+    frame: pd.DataFrame,
+    axes_of: Sequence[Axis],
     least: Sequence[float],
     looks: Mapping[Any, Look],
 ) -> None:
+    if frame.empty:
+        return
     keys = [key for key in (layer.hue, layer.group) if key]
-    parts = rows.groupby(keys, sort=False) if keys else [((), rows)]
-    for values, part in parts:
+    for values, rows in frame.groupby(keys, sort=False) if keys else [((), frame)]:
         hue = values[0] if layer.hue else None
-        look = dict(looks.get(hue, {})) if layer.hue else {"color": style.BLUE}
+        look = dict(looks[hue]) if layer.hue else {"color": style.BLUE}
         label = layer.label
         if layer.hue:
             label = str(hue) if label is None else label.format(hue)
-        at_x = _place(part[layer.x], scales[0], least[0])
-        at_y = _place(part[layer.y], scales[1], least[1])
+        columns = (layer.x, 0), (layer.y, 1), (layer.to or layer.y, 1)
+        at_x, at_y, to = (_place(rows[name], axes_of[k], least[k]) for name, k in columns)
         if layer.mark == "text":
-            _write(axes, at_x, at_y, part, layer)
-            continue
-        if layer.mark in ("band", "bars", "area"):
-            other = _place(part[layer.to], scales[1], least[1]) if layer.to else at_y
-            _fill(axes, at_x, at_y, other, layer, look | dict(layer.look), label)
-            continue
-        axes.plot(at_x, at_y, label=label or None, **_line(layer, look))
+            _write(axes, at_x, at_y, rows, layer)
+        elif layer.mark in ("band", "bars", "area"):
+            _fill(axes, (at_x, at_y, to), layer, {"color": look["color"], **layer.look}, label)
+        else:
+            axes.plot(at_x, at_y, label=label or None, **_line(layer, look))
 
 
 def _line(layer: Layer, look: dict[str, Any]) -> dict[str, Any]:
-    """Keywords of Axes.plot for a mark: its dash or marker goes before that of the hue."""
+    """Keywords of Axes.plot: the dash or marker of the mark goes before that of the hue."""
     mark = "-" if layer.mark == "steps" else layer.mark
     dash = next((d for d in ("--", "-.", "-", ":") if d in mark), "")
     marker = mark.replace(dash, "") if dash else mark
-    if not dash:
-        look["linestyle"] = "none"
-    elif dash != "-":
-        look["linestyle"] = dash
+    if dash != "-":
+        look["linestyle"] = dash or "none"
     if not marker:
         look.pop("marker", None)
     elif marker != "o" or "marker" not in look:
@@ -290,45 +241,61 @@ def _line(layer: Layer, look: dict[str, Any]) -> dict[str, Any]:
 
 
 def _fill(
-    axes: Axes, x: Array, y: Array, other: Array, layer: Layer, look: dict[str, Any], label: Any
+    axes: Axes, at: tuple[Array, Array, Array], layer: Layer, look: dict[str, Any], label: Any
 ) -> None:
-    colour, label = look.pop("color"), label or None
-    for key in ("linestyle", "marker"):
-        look.pop(key, None)
+    x, y, to = at
     if layer.mark == "band":
-        look = {"alpha": 0.25, "linewidth": 0} | look
-        axes.fill_between(x, y, other, color=colour, label=label, **look)
+        axes.fill_between(x, y, to, label=label or None, **{"alpha": 0.25, "linewidth": 0} | look)
     elif layer.mark == "bars":
-        axes.bar(x, y, layer.width, color=colour, label=label, **look)
+        axes.bar(x, y, layer.width, label=label or None, **look)
         axes.axhline(0.0, color=style.GREY, linewidth=0.8)
     else:
-        look = {"edgecolor": "white", "linewidth": 0.6, "facecolor": colour} | look
-        axes.add_patch(Polygon(np.column_stack([x, y]), label=label, **look))
+        edge = {"edgecolor": "white", "linewidth": 0.6, "facecolor": look.pop("color")}
+        axes.add_patch(Polygon(np.column_stack([x, y]), label=label or None, **edge | look))
         axes.update_datalim(np.column_stack([x, y]))
 
 
 def _write(axes: Axes, x: Array, y: Array, rows: pd.DataFrame, layer: Layer) -> None:
-    """Texts beside points: columns dx and dy (points), side; with look leader=True a line to it."""
-    look = dict(layer.look)
-    leader = {"arrowstyle": "-", "color": style.GREY, "linewidth": 0.8, "shrinkB": 0}
-    arrow = leader if look.pop("leader", False) else None
-    columns = {"dx": 0.0, "dy": 0.0, "side": "center"}
-    given = [list(rows.get(k, pd.Series([v] * len(rows)))) for k, v in columns.items()]
-    for at_x, at_y, text, dx, dy, side in zip(x, y, rows[layer.text], *given, strict=True):
-        axes.annotate(
-            *(str(text), (at_x, at_y), (dx, dy)),
-            textcoords="offset points",
-            arrowprops=arrow,
-            **{"ha": side, "va": "center", "fontsize": 9, "path_effects": HALO, "zorder": 8} | look,
-        )
+    look: dict[str, Any] = {"va": "center", "fontsize": 9, "path_effects": HALO, "zorder": 8}
+    look |= {"textcoords": "offset points", **layer.look}
+    look["arrowprops"] = LEADER if look.pop("leader", False) else None
+    places = pd.DataFrame({"dx": 0.0, "dy": 0.0, "side": "center"}, index=rows.index)
+    places.update(rows)
+    for text, *at, dx, dy, side in zip(rows[layer.text], x, y, *places.to_numpy().T, strict=True):
+        axes.annotate(str(text), tuple(at), (dx, dy), ha=side, **look)
 
 
-def _set_axis(axes: Axes, axis: Axis, which: Literal["x", "y"], hidden: bool) -> None:
+def _set_all(figure: Figure, grid: Any, names: Sequence[Any], both: Any, share: str) -> None:
+    """Scales, ticks and labels; one label for all panels where one axis is that of all."""
+    shape = grid.shape
+    for k, axes in enumerate(grid.ravel()):
+        if k >= len(names):
+            axes.set_axis_off()
+            continue
+        below, beside = k + shape[1] < len(names), k % shape[1] > 0
+        axes.xaxis.set_tick_params(labelbottom="x" not in share or not below)
+        for which, of_all, inner, n in zip("xy", both, (below, beside), shape[::-1], strict=True):
+            axis = of_all if isinstance(of_all, Axis) else of_all[names[k]]
+            _set_axis(axes, axis, which)
+            if n > 1 and axis is of_all:
+                getattr(figure, f"sup{which}label")(axis.label, fontsize=10)
+            elif not (inner and which in share):
+                axes.set(**{f"{which}label": axis.label})
+
+
+def _set_axis(axes: Axes, axis: Axis, which: str) -> None:
     own = axes.xaxis if which == "x" else axes.yaxis
-    axes.set_xmargin(axis.margin) if which == "x" else axes.set_ymargin(axis.margin)
+    getattr(axes, f"set_{which}margin")(axis.margin)
     if axis.log:
         axes.set(**{f"{which}scale": "log"})
-        _log_ticks(axes, axis, which)
+        low, high = own.get_view_interval()
+        # 1, 2, 5 beside few decades; decimals, or all as powers of ten
+        subs = (1.0, 2.0, 5.0) if high / low < 300 else (1.0,)
+        own.set_major_locator(LogLocator(subs=subs, numticks=8))
+        own.set_minor_locator(NullLocator())
+        decimals = low > 2e-4 and high < 3e5
+        write = style.signed if decimals else _power
+        own.set_major_formatter(FuncFormatter(lambda value, _: write(value)))
     elif axis.linear_below is not None:
         _symmetric(axes, axis.linear_below, which)
     else:
@@ -342,21 +309,6 @@ def _set_axis(axes: Axes, axis: Axis, which: Literal["x", "y"], hidden: bool) ->
             texts = list(axis.ticks.values())
         own.set_ticks(list(axis.ticks), texts, rotation=axis.rotation)
         own.set_minor_locator(NullLocator())
-    if not hidden:
-        own.set_label_text(axis.label)
-
-
-def _log_ticks(axes: Axes, axis: Axis, which: Literal["x", "y"]) -> None:
-    """Decades, or 1, 2, 5 if there are few, as decimals, or all as powers of ten."""
-    own = axes.xaxis if which == "x" else axes.yaxis
-    low, high = axes.get_xlim() if which == "x" else axes.get_ylim()
-    few = high / low < 300
-    own.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,), numticks=8))
-    own.set_minor_locator(NullLocator())
-    if low > 2e-4 and high < 3e5:
-        own.set_major_formatter(FuncFormatter(lambda value, _: style.signed(value)))
-    else:
-        own.set_major_formatter(FuncFormatter(lambda value, _: _power(value)))
 
 
 def _power(value: float) -> str:
@@ -365,38 +317,31 @@ def _power(value: float) -> str:
     return f"${times}10^{{{int(power)}}}$"
 
 
-def _symmetric(axes: Axes, linear: float, which: Literal["x", "y"]) -> None:
+def _symmetric(axes: Axes, linear: float, which: str) -> None:
     """Linear about zero, logarithmic beyond: small and large errors are read in one picture."""
     own = axes.xaxis if which == "x" else axes.yaxis
-    low, high = axes.dataLim.intervalx if which == "x" else axes.dataLim.intervaly
-    set_scale = axes.set_xscale if which == "x" else axes.set_yscale
-    set_scale("symlog", linthresh=linear, linscale=0.45)
+    low, high = own.get_data_interval()
+    getattr(axes, f"set_{which}scale")("symlog", linthresh=linear, linscale=0.45)
     largest = max(abs(low), abs(high), 10 * linear)
     decades = [linear * 10.0**k for k in range(int(np.ceil(np.log10(largest / linear))) + 1)]
-    signs = [-t for t in decades[::-1]] if low < -linear else []
-    own.set_ticks([*signs, 0.0, *decades], [style.signed(t) for t in [*signs, 0.0, *decades]])
+    ticks = [*(-t for t in decades[::-1] if low < -linear), 0.0, *decades]
+    own.set_ticks(ticks, [style.signed(t) for t in ticks])
     own.set_minor_locator(NullLocator())
     top = 1.35 * largest
-    axes.set(**{f"{which}lim": (-top if signs else -0.15 * linear, top)})
+    axes.set(**{f"{which}lim": (-top if low < -linear else -0.15 * linear, top)})
 
 
-def _legend(figure: Figure, panels: Iterable[Axes], heading: str) -> None:
+def _legend(figure: Figure, heading: str) -> None:
     """One legend above all panels, as wide as its texts allow."""
     entries: dict[str, Any] = {}
-    for axes in panels:
+    for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
-    if not entries:
-        return
-    longest = max(len(label) for label in entries) + 6
-    columns = max(1, min(len(entries), LEGEND_CHARACTERS // longest))
-    legend = figure.legend(
-        list(entries.values()),
-        list(entries),
-        loc="outside upper center",
-        ncols=columns,
-        title=heading or None,
-    )
-    for handle in legend.legend_handles:
-        if isinstance(handle, Line2D):  # the dots of many points are small
-            handle.set_markersize(max(handle.get_markersize(), 5.0))
+    if entries:
+        longest = max(len(label) for label in entries) + 6
+        columns = max(1, min(len(entries), CHARACTERS // longest))
+        options: dict[str, Any] = {"loc": "outside upper center", "title": heading or None}
+        legend = figure.legend(list(entries.values()), list(entries), ncols=columns, **options)
+        for drawn in legend.legend_handles:
+            if isinstance(drawn, Line2D):  # the dots of many points are small
+                drawn.set_markersize(max(drawn.get_markersize(), 5.0))

@@ -16,11 +16,8 @@ from flexik.reporting.chart import Axis, Layer, Rule, chart
 
 MARKED = {0.5: "o", 0.99: "D"}  # quantiles with a mark on a distribution
 BAND = "#F3F3F3"
-SIZE_LOOKS: dict[str, style.Look] = {
-    "selection error, best start": {"color": style.BLUE, "marker": "o"},
-    "selection error, median": {"color": style.SKY, "linestyle": "-", "marker": ""},
-    "training error": {"color": style.ORANGE, "linestyle": "-", "marker": "s"},
-}
+BEST, MEDIAN = "selection error, best start", "selection error, median"
+SPAN, TRAINING = "selection error, best to worst start", "training error"
 
 
 def strips(
@@ -33,20 +30,14 @@ def strips(
     rotation: float = 90.0,
     **options: Any,
 ) -> Figure:
-    """Dots, or bars, of every category side by side.
+    """Dots, or bars, of every category side by side; the `x` of the layers is made here.
 
-    Parameters
-    ----------
-    layers
-        Their `x` is made here; "bars" of the values of `spread` stand beside each other.
-    category, names
-        Column that tells the category, and what to write below each, in order.
-    spread
-        Column whose values (the same in all layers) are set apart within a category.
+    category, names : column that tells the category, and what to write below each, in order.
+    spread : column whose values (the same in all layers) are set apart within a category.
     """
     order = {value: k for k, value in enumerate(names)}
-    values = sorted({v for layer in layers for v in layer.frame[spread]}) if spread else []
-    step = 0.8 / max(len(values), 1)
+    values = sorted({v for layer in layers for v in layer.frame[spread]}) if spread else [None]
+    step = 0.8 / len(values)
     moved = []
     for layer in layers:
         place = layer.frame[category].map(order).astype(float)
@@ -78,48 +69,41 @@ def beside(
     numbers: str = ".2f",
     **options: Any,
 ) -> Figure:
-    """Our values filled, published ones open, a line for every category, the first on top.
+    """Our values filled, published ones (NaN: none) open, a line a category, the first on top.
 
-    Parameters
-    ----------
-    frame
-        Columns category, value, published (NaN: none), hue, panel.
-    names
-        What to write for a category.
-    numbers
-        Format of the numbers beside the dots; "" for none.
+    names : what to write for a category.
+    numbers : format of the numbers beside the dots; "" for none.
     """
-    categories = list(dict.fromkeys(frame[category]))
-    frame = frame.assign(place=frame[category].map({c: k for k, c in enumerate(categories)}))
-    frame = frame.assign(row=np.arange(len(frame)))
+    categories = {value: k for k, value in enumerate(dict.fromkeys(frame[category]))}
+    frame = frame.assign(place=frame[category].map(categories), row=np.arange(len(frame)))
     keep = ["place", "row", *filter(None, (hue, panel))]
     ours, theirs = (frame[[*keep, k]].rename(columns={k: "at"}) for k in (value, published))
     theirs = theirs.dropna(subset="at")
     both = pd.concat([ours[ours["row"].isin(theirs["row"])], theirs])
     open_dot = {"markersize": 9.0, "fillstyle": "none", "zorder": 2.2}
-    if hue is None:
-        open_dot["color"] = style.INK
-    ours_label, their_label = ("{}", "{}, published") if hue else ("ours", "published")
-    layers = [Layer(ours, "at", "place", "o", hue, label=ours_label, look={"markersize": 6.0})]
-    if len(theirs):
-        grey = {"color": style.GREY, "linewidth": 1.2, "zorder": 1.5}
-        layers.insert(0, Layer(both, "at", "place", "-", group="row", label="", look=grey))
-        layers.append(Layer(theirs, "at", "place", "o", hue, label=their_label, look=open_dot))
+    open_dot |= {} if hue else {"color": style.INK}
+    grey = {"color": style.GREY, "linewidth": 1.2, "zorder": 1.5}
+    labels = ("{}", "{}, published") if hue else ("ours", "published")
+    layers = [
+        Layer(both, "at", "place", "-", group="row", label="", look=grey),
+        Layer(ours, "at", "place", "o", hue, label=labels[0], look={"markersize": 6.0}),
+        Layer(theirs, "at", "place", "o", hue, label=labels[1], look=open_dot),
+    ]
     if numbers:
         for rows, dy, colour in ((theirs, -12.0, style.INK), (ours, 12.0, style.BLUE)):
-            if len(rows):
-                texts = rows.assign(text=[format(v, numbers) for v in rows["at"]], dy=dy)
-                look = {"color": colour}
-                layers.append(Layer(texts, "at", "place", "text", text="text", look=look))
-    ticks = {k: (names or {}).get(c, str(c)) for k, c in enumerate(categories)}
+            texts = rows.assign(text=[format(v, numbers) for v in rows["at"]], dy=dy)
+            look = {"color": colour}
+            layers.append(Layer(texts, "at", "place", "text", text="text", look=look))
+        wide = {
+            k: replace(a, margin=0.12) for k, a in ({0: x} if isinstance(x, Axis) else x).items()
+        }
+        x = wide[0] if isinstance(x, Axis) else wide
+    ticks = {k: (names or {}).get(c, str(c)) for c, k in categories.items()}
     y = Axis(ticks=ticks, limits=(len(ticks) - 0.45, -0.55))
-    if numbers:  # room for them
-        by_panel = x if isinstance(x, Mapping) else {None: x}
-        wide = {name: replace(axis, margin=0.12) for name, axis in by_panel.items()}
-        x = wide if isinstance(x, Mapping) else wide[None]
-    height = 1.3 + (0.6 if numbers else 0.42) * len(ticks)
-    defaults: dict[str, Any] = {"height": height, "share": "y"}
-    return chart(*layers, x=x, y=y, panel=panel, **defaults | options)
+    defaults: dict[str, Any] = {"share": "y"}
+    defaults["height"] = 1.3 + (0.6 if numbers else 0.42) * len(ticks)
+    shown = [layer for layer in layers if len(layer.frame)]
+    return chart(*shown, x=x, y=y, panel=panel, **defaults | options)
 
 
 def distribution(
@@ -136,46 +120,32 @@ def distribution(
 ) -> Figure:
     """Share of the rows with at most each value, a line for every value of `hue`.
 
-    Parameters
-    ----------
-    what
-        The rows, in words.
-    quantiles
-        Mark MARKED on the curves and write them in the legend (for one panel only).
-    of_all
-        Share of all rows, those without a number (failed) among them.
+    what : the rows, in words.
+    quantiles : mark MARKED on the curves and write them in the legend (for one panel only).
+    of_all : share of all rows, those without a number (failed) among them.
     """
-    axis, curves, marks = x, [], []
-    for keys, rows in frame.groupby([hue, *([panel] if panel else [])], sort=False):
+    keys = [hue, *([panel] if panel else [])]
+    layers, marks = [], []
+    for names, rows in frame.groupby(keys, sort=False):
         values = np.sort(rows[value].dropna().to_numpy(dtype=float))
         share = 100.0 * np.arange(1, len(values) + 1) / (len(rows) if of_all else len(values))
-        named: dict[str, Any] = dict(zip([hue, *([panel] if panel else [])], keys, strict=True))
-        steps = {"at": [values[0], *values], "share": [0.0, *share]}
-        found = {q: np.searchsorted(share, 100 * q - 1e-9) for q in MARKED}
-        label = str(keys[0])
-        if quantiles and not panel and isinstance(axis, Axis):
-            label += f": {', '.join(_three(axis.scale * values[k]) for k in found.values())}"
+        curve = pd.DataFrame({"at": [values[0], *values], "share": [0.0, *share]})
+        named: dict[str, Any] = dict(zip(keys, names, strict=True))
+        curve, label = curve.assign(**named), str(names[0])
+        if quantiles and isinstance(x, Axis) and not panel:
+            found = {q: int(np.searchsorted(share, 100 * q - 1e-9)) for q in MARKED}
+            label += f": {', '.join(_three(x.scale * values[k]) for k in found.values())}"
             for q, k in found.items():
-                marks.append(named | {"q": q, "at": values[k], "share": share[k]})
-        curves.append(pd.DataFrame(steps).assign(**named, label=label))
-    table = pd.concat(curves)
-    looks = {**style.looks(dict.fromkeys(frame[hue])), **options.pop("looks", {})}
-    layers = [
-        Layer(rows, "at", "share", "steps", hue, label=str(label))
-        for label, rows in table.groupby("label", sort=False)
-    ]
-    for q, shape in MARKED.items():
-        rows = pd.DataFrame([mark for mark in marks if mark["q"] == q])
-        if len(rows):
-            look = {"marker": shape, "markersize": 5.5}
-            layers.append(Layer(rows, "at", "share", "o", hue, label="", look=look))
+                look = {"marker": MARKED[q], "markersize": 5.5}
+                mark = curve.iloc[[k + 1]]
+                marks.append(Layer(mark, "at", "share", "o", hue, label="", look=look))
+        layers.append(Layer(curve, "at", "share", "steps", hue, label=label))
     if marks:
         text = " and ".join(f"{100 * q:g} %" for q in MARKED)
         options.setdefault("legend", f"value at {text} of the {what} (circle, diamond)")
-    ticks = (0, 25, 50, 75, 99)
-    y = Axis(f"{what} with at most this error (%)", limits=(0, 101.5), ticks=ticks)
+    y = Axis(f"{what} with at most this error (%)", limits=(0, 101.5), ticks=(0, 25, 50, 75, 99))
     defaults: dict[str, Any] = {"height": 5.2, "share": "y"}
-    return chart(*layers, x=x, y=y, panel=panel, looks=looks, **defaults | options)
+    return chart(*layers, *marks, x=x, y=y, panel=panel, **defaults | options)
 
 
 def _three(value: float) -> str:
@@ -186,43 +156,34 @@ def sizes(
     frame: pd.DataFrame,
     *,
     panel: str | None = None,
-    chosen: Mapping[Any, int] | int | None = None,
-    published: Mapping[Any, int] | int | None = None,
+    chosen: Mapping[Any, int | None] | int | None = None,
+    published: Mapping[Any, int | None] | int | None = None,
     band: bool = True,
     x_label: str = "hidden neurons (1)",
     y: Axis | None = None,
     **options: Any,
 ) -> Figure:
-    """Training and selection error against the size of the network.
+    """Training and selection error (learning.size_selection.by_size) against the network's size.
 
-    Parameters
-    ----------
-    frame
-        Rows of learning.size_selection.by_size, and the column `panel`.
-    chosen, published
-        Sizes to mark, by panel or for all.
-    band
-        Show the band from the best to the worst start, and the median where there is one.
+    chosen, published : sizes to mark, by panel or for all.
+    band : show the band from the best to the worst start, and the median.
     """
-    columns = {"selection error, best start": "selection_error", "training error": "training_error"}
-    known = frame[["selection_error", "training_error"]].notna().all(axis=1)
+    orange = {"color": style.ORANGE, "marker": "s"}
     layers = [
-        Layer(frame[known], "n_hidden", column, "o-", label=label, look=SIZE_LOOKS[label])
-        for label, column in columns.items()
+        Layer(frame, "n_hidden", "selection_error", "o-", label=BEST),
+        Layer(frame, "n_hidden", "training_error", "o-", label=TRAINING, look=orange),
     ]
-    if band and "worst_selection_error" in frame:
-        label = "selection error, best to worst start"
-        span = Layer(frame, "n_hidden", "selection_error", "band", to="worst_selection_error")
-        layers.insert(0, replace(span, look={"color": style.SKY}, label=label))
-    if band and "median_selection_error" in frame:
-        label = "selection error, median"
-        median = Layer(frame, "n_hidden", "median_selection_error", label=label)
-        layers.insert(1, replace(median, look=SIZE_LOOKS[label]))
+    if band:
+        sky, worst = {"color": style.SKY}, "worst_selection_error"
+        layers = [
+            Layer(frame, "n_hidden", "selection_error", "band", to=worst, label=SPAN, look=sky),
+            Layer(frame, "n_hidden", "median_selection_error", label=MEDIAN, look=sky),
+            *layers,
+        ]
     rules = []
     marks = (("chosen", chosen, style.CHOSEN), ("published", published, style.PUBLISHED))
-    for label, sizes_of, look in marks:
-        by_panel = sizes_of if isinstance(sizes_of, Mapping) else {None: sizes_of}
-        for name, size in by_panel.items():
+    for label, given, look in marks:
+        for name, size in (given if isinstance(given, Mapping) else {None: given}).items():
             if size is not None:
                 text = f"{label} size" if panel else f"{label}: {size}"
                 rules.append(Rule("x", size, text, look, panel=name))
@@ -237,39 +198,27 @@ def sequences(
 ) -> Figure:
     """Numbers in their order, mapped onto [-1, 1], and the first of them enlarged beside.
 
-    Parameters
-    ----------
-    parts
-        Numbers of a row of panels, by its title.
-    colours
-        Of the rows.
+    parts : numbers of a row of panels, by its title.
+    colours : of the rows.
     """
     layers: list[Layer] = []
     titles: dict[str, str] = {}
-    panels: list[str] = []
     for (title, values), colour in zip(parts.items(), colours, strict=False):
         numbers = np.asarray(values, dtype=float)
         low, high = numbers.min(), numbers.max()
         normalised = 2 * (numbers - low) / (high - low) - 1 if high > low else 0 * numbers
-        every = pd.DataFrame({"number": np.arange(1, len(numbers) + 1), "value": normalised})
-        first = f"first {min(detail, len(every))} of {title}"
-        titles |= {title: title, first: f"first {min(detail, len(every))}" if not panels else ""}
-        panels += [title, first]
-        whole, few = every.assign(panel=title), every[:detail].assign(panel=first)
-        look = {"color": colour}
-        layers.append(Layer(whole, "number", "value", ".", look=look | {"markersize": 1.5}))
-        layers.append(
-            Layer(few, "number", "value", ".-", look=look | {"markersize": 3, "linewidth": 0.8})
-        )
-    return chart(
-        *layers,
-        x={name: Axis("vector number") for name in panels},
-        y=Axis("normalised (1)", limits=(-1.12, 1.12), ticks=(-1, 0, 1)),
-        panel="panel",
-        panels=panels,
-        titles=titles,
-        columns=2,
-        widths=(3, 1.3),
-        share="y",
-        height=0.6 + 1.75 * len(parts),
-    )
+        whole = pd.DataFrame({"number": np.arange(1, len(numbers) + 1), "value": normalised})
+        first = f"first {min(detail, len(whole))} of {title}"
+        titles |= {title: title, first: "" if titles else first.removesuffix(f" of {title}")}
+        small, large = {"markersize": 1.5}, {"markersize": 3, "linewidth": 0.8}
+        for name, rows, mark, look in (
+            (title, whole, ".", small),
+            (first, whole[:detail], ".-", large),
+        ):
+            rows = rows.assign(panel=name)
+            layers.append(Layer(rows, "number", "value", mark, look={"color": colour, **look}))
+    x = {name: Axis("vector number") for name in titles}
+    y = Axis("normalised (1)", limits=(-1.12, 1.12), ticks=(-1, 0, 1))
+    layout: dict[str, Any] = {"columns": 2, "widths": (3, 1.3), "share": "y"}
+    layout["height"] = 0.6 + 1.75 * len(parts)
+    return chart(*layers, x=x, y=y, panel="panel", titles=titles, **layout)

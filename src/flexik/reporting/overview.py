@@ -4,6 +4,7 @@ Between `<!-- flexik:NAME -->` and `<!-- /flexik:NAME -->` stands the table repo
 `overview`, what all cases reached beside the published values: the rows of cases/*/overview.csv.
 """
 
+import csv
 import re
 from fnmatch import fnmatch
 from pathlib import Path
@@ -24,10 +25,9 @@ def update(readme: Path | str) -> None:
     try:
         text = Path(readme).read_text(encoding="utf-8")
         for name in re.findall(r"<!-- flexik:(\S+) -->", text):
-            overview_or_table = (
-                overview() if name == "overview" else (REPORTS / f"{name}.md").read_text("utf-8")
-            )
-            text = replace_block(text, name, overview_or_table)
+            table = REPORTS / f"{name}.md"
+            new = overview() if name == "overview" else table.read_text("utf-8")
+            text = replace_block(text, name, new)
     except OSError as error:
         raise DataError(f"{error.filename}: cannot be read ({error.strerror})") from None
     write_text(readme, text)
@@ -43,7 +43,9 @@ def overview() -> str:
     rows = []
     for file in sorted(CASES.glob("*/overview.csv")):
         metrics = read_json(REPORTS / file.parent.name / "metrics.json")
-        for entry in pd.read_csv(file, dtype=str, keep_default_na=False).to_dict("records"):
+        with file.open(encoding="utf-8", newline="") as lines:
+            entries = list(csv.DictReader(lines))
+        for entry in entries:
             found = [v for name, v in metrics.items() if fnmatch(name, entry["metric"])]
             value = float(entry["scale"]) * sum(found) / len(found) if found else None
             rows.append(
@@ -64,7 +66,7 @@ def _published(case: str, where: str) -> str:
         return where
     row, column, scale = [*place, "1"][:3]
     table = pd.read_csv(REFERENCE / case / file, index_col=0)
-    return format(float(scale) * float(table.loc[row, column]), "g")
+    return format(float(scale) * float(table[column][row]), "g")
 
 
 def replace_block(text: str, name: str, new: str) -> str:

@@ -91,13 +91,13 @@ def render(
         above = " ".join(line for line in lines if line and not line.startswith("- "))
         page.tables[name] = tables[name].markdown(above or caption, notes)
         csv = f"{name}.csv"
-        return f"{page.tables[name]}\n[{Path(csv).name}]({quote(csv)})\n"
+        return f"\n{page.tables[name]}\n[{Path(csv).name}]({quote(csv)})\n\n"
 
     def figure(name: str, caption: str) -> str:
         style.require(f"{path}: figures", known, [name])
         page.figures.append(name)
         alternative = caption.replace("[", "(").replace("]", ")")
-        return f"![{alternative}]({quote(f'figures/{name}.png')})\n\n*{caption}*\n"
+        return f"\n![{alternative}]({quote(f'figures/{name}.png')})\n\n*{caption}*\n"
 
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(path.parent),

@@ -1,7 +1,7 @@
 """Figures over the plane and in space: maps of a value, and mechanisms of three dimensions."""
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from flexik.reporting import style
-from flexik.reporting.chart import Axis, Layer
+from flexik.reporting.chart import SPAN, Axis, Layer
 
 Array = NDArray[np.float64]
 
@@ -21,7 +21,6 @@ Array = NDArray[np.float64]
 MAP = ListedColormap(mpl.colormaps["magma"](np.linspace(0.08, 0.95, 256)))
 STEPS = [float(f"{m}e{k}") for k in range(-18, 19) for m in (1, 2, 5)]
 MILLIMETRES = tuple(Axis(f"{k} (mm)", style.MM) for k in "xyz")
-SPAN = 1e5  # greatest over least value told apart
 
 
 def maps(
@@ -35,61 +34,46 @@ def maps(
     scale: float = 1.0,
     cell: float | None = None,
     columns: int = 5,
-    unit: str = "m",
 ) -> Figure:
-    """Value over the plane, a panel for every value of `panel`, bright where it is large.
+    """Value over the plane (m), a panel for every value of `panel`, bright where it is large.
 
-    Parameters
-    ----------
-    frame
-        Columns x, y, value, panel; a row for every place.
-    label, scale
-        Quantity and unit of the colours; factor to it.
-    cell
-        Side of the squares whose mean is drawn; None draws a dot for every row.
-    unit
-        Of x and y.
+    label, scale : quantity and unit of the colours; factor to it.
+    cell : side of the squares whose mean is drawn; None draws a dot for every row.
     """
-    names = list(dict.fromkeys(frame[panel]))
-    parts = dict(iter(frame.groupby(panel, sort=False)))
+    parts = {str(name): rows for name, rows in frame.groupby(panel, sort=False)}
     edges = [_edges(frame[k].to_numpy(dtype=float), cell or 1.0) for k in (x, y)]
     drawn = {
-        name: _means(rows, x, y, value, edges) if cell else rows[value].to_numpy(dtype=float)
+        name: scale * (_means(rows, x, y, value, edges) if cell else rows[value].to_numpy())
         for name, rows in parts.items()
     }
-    known = scale * np.concatenate([v[np.isfinite(v)] for v in drawn.values()])
+    known = np.concatenate([v[np.isfinite(v)] for v in drawn.values()])
     least = max(float(known.min()), float(known.max()) / SPAN)
     low, high = max(s for s in STEPS if s <= least), min(s for s in STEPS if s >= known.max())
-    norm = LogNorm(low, high)
-    columns = min(columns, len(names) if len(names) <= columns else -(-len(names) // 2))
-    rows = -(-len(names) // columns)
-    spans = [np.ptp(frame[k]) for k in (x, y)]
-    height = min((style.WIDTH - 0.8) / columns * spans[1] / spans[0], 3.7)
+    look = {"cmap": MAP, "norm": LogNorm(low, high)}
+    n = len(parts)
+    columns = n if n <= columns else min(columns, -(-n // 2))
+    rows = -(-n // columns)
+    height = min((style.WIDTH - 0.8) / columns * np.ptp(frame[y]) / np.ptp(frame[x]), 3.7)
     figure = Figure(figsize=(style.WIDTH, 0.95 + rows * (height + 0.3)), layout="compressed")
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    for k, axes in enumerate(panels):
-        if k >= len(names):
-            axes.set_axis_off()
-            continue
-        values = np.maximum(scale * drawn[names[k]], low)
+    for k, (axes, (name, values)) in enumerate(zip(panels, drawn.items(), strict=False)):
+        values = np.maximum(values, low)
         if cell:
-            shown = axes.pcolormesh(*edges, np.ma.masked_invalid(values.T), cmap=MAP, norm=norm)
+            shown: Any = axes.pcolormesh(*edges, np.ma.masked_invalid(values.T), **look)
         else:
-            places = parts[names[k]][x], parts[names[k]][y]
-            shown = axes.scatter(*places, 7, values, cmap=MAP, norm=norm, linewidths=0)
-        axes.set_title(textwrap.fill(str(names[k]), 88 // columns), fontsize=9.5)
-        axes.set_aspect("equal")
+            shown = axes.scatter(*(parts[name][c] for c in (x, y)), 7, values, linewidths=0, **look)
+        axes.set(title=textwrap.fill(name, 88 // columns), aspect="equal")
         axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
-        if k + columns >= len(names):
+        if k + columns >= n:
             axes.tick_params(labelbottom=True)
-            axes.set_xlabel(f"x ({unit})")
-        if k % columns == 0:
-            axes.set_ylabel(f"y ({unit})")
+            axes.set_xlabel("x (m)")
+        axes.set_ylabel("" if k % columns else "y (m)")
+    for axes in panels[n:]:
+        axes.set_axis_off()
+    place: dict[str, Any] = {"location": "bottom", "shrink": 0.7, "aspect": 45}
     extend = "min" if (known < low).any() else "neither"
-    bar = figure.colorbar(
-        shown, ax=list(panels), location="bottom", shrink=0.7, aspect=45, extend=extend
-    )
-    bar.set_label(label + (f", mean in squares of {cell:g} {unit}" if cell else ""))
+    bar = figure.colorbar(shown, ax=list(panels), extend=extend, **place)
+    bar.set_label(label + (f", mean in squares of {cell:g} m" if cell else ""))
     ticks = [s for s in STEPS[::3] if low <= s <= high]
     bar.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks])
     bar.ax.minorticks_off()
@@ -112,37 +96,29 @@ def space(
     *layers: Layer,
     z: str = "z",
     axes_of: Sequence[Axis] = MILLIMETRES,
-    looks: dict[Any, Any] | None = None,
+    looks: Mapping[Any, style.Look] | None = None,
     view: tuple[float, float] = (18.0, -50.0),
     height: float = 5.6,
 ) -> Figure:
-    """Lines and dots of layers in space, as reporting.chart draws them in the plane.
+    """Lines ("-", "--") and dots ("o") of layers in space, as reporting.chart draws them.
 
-    Parameters
-    ----------
-    z
-        Column of the third coordinate.
-    axes_of
-        Labels and scales, by default of mm.
-    view
-        Elevation and azimuth, degrees.
+    z : column of the third coordinate.
+    axes_of : labels and scales.
+    view : elevation and azimuth, degrees.
     """
     figure = Figure(figsize=(style.WIDTH, height))
     axes: Any = figure.add_subplot(projection="3d")
-    looks = looks or {}
     for layer in layers:
         keys = [key for key in (layer.hue, layer.group) if key]
-        parts = layer.frame.groupby(keys, sort=False) if keys else [((), layer.frame)]
-        for values, rows in parts:
-            look = dict(looks.get(values[0], {})) if layer.hue else {}
+        for values, rows in layer.frame.groupby(keys, sort=False) if keys else [((), layer.frame)]:
+            look = dict((looks or {}).get(values[0], {})) if layer.hue else {}
             label = str(values[0]) if layer.hue and layer.label is None else layer.label
-            columns = (layer.x, layer.y, z)
-            points = [a.scale * rows[k] for a, k in zip(axes_of, columns, strict=True)]
-            mark = {"linestyle": "none", "marker": "o"} if layer.mark == "o" else {}
-            mark |= {"linestyle": "--"} if layer.mark == "--" else {}
-            axes.plot(*points, label=label or None, **(look | mark | dict(layer.look)))
-    for axis, which in zip(axes_of, "xyz", strict=True):
-        axes.set(**{f"{which}label": axis.label})
+            points = zip(axes_of, (layer.x, layer.y, z), strict=True)
+            dot = {"linestyle": "none", "marker": "o"}
+            look |= dot if layer.mark == "o" else {"linestyle": layer.mark}
+            data = [axis.scale * rows[name] for axis, name in points]
+            axes.plot(*data, label=label or None, **look | dict(layer.look))
+    axes.set(**{f"{k}label": axis.label for axis, k in zip(axes_of, "xyz", strict=True)})
     axes.set_aspect("equal")
     axes.view_init(elev=view[0], azim=view[1])
     entries = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))

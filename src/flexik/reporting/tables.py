@@ -8,6 +8,7 @@ import numbers
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -57,10 +58,10 @@ def mm(source: str, decimals: int = DECIMALS) -> Column:
     return Column(source, decimals, MM)
 
 
-def table(rows: pd.DataFrame | Sequence[Mapping], columns: Mapping[str, str | Column]) -> Table:
+def table(rows: pd.DataFrame | Sequence[Mapping], columns: Mapping[str, Any]) -> Table:
     """Table of some columns of `rows` under the titles that are the keys of `columns`.
 
-    A name stands for a column that is taken as it is. Raises DataError if one is missing.
+    Values are Columns, or names of columns taken as they are. Raises DataError if one is missing.
     """
     frame = pd.DataFrame(rows)
     given = {t: c if isinstance(c, Column) else Column(c) for t, c in columns.items()}

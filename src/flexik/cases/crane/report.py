@@ -108,8 +108,11 @@ def values(results: Results) -> dict[str, Any]:
         "workspace": conditions["workspace"],
         "least_trained_payload": section.samples.grid.payload.minimum,
         "descends": all(
-            section.methods[name].inversion.kind == "gradient_descent"
-            for name in section.studies.tolerance.methods
+            inversion["kind"] == "gradient_descent"
+            for inversion in (
+                section.methods[name].model_dump()["inversion"]
+                for name in section.studies.tolerance.methods
+            )
         ),
         "has_cost": not results.query_cost().drop(columns="published").dropna().empty,
         "grid": counts(results.grid),
@@ -204,11 +207,12 @@ def far_from_published(results: Results) -> list[dict[str, Any]]:
     """Statistics without compensation that differ by more than CALIBRATION_TARGET."""
     fitted = calibration(results).rename(columns={"difference (%)": "difference"})
     far = ~(np.abs(fitted["difference"]) <= CALIBRATION_TARGET)
-    return fitted[far].to_dict("records")  # type: ignore[return-value]
+    return fitted[far].to_dict("records")
 
 
 def worst_condition(frame: pd.DataFrame) -> dict[str, Any]:
     """The condition with the largest error, and the largest of the other points (m)."""
     worst = frame.iloc[int(frame["error"].to_numpy().argmax())]
     others = frame.loc[frame["point"] != worst["point"], "error"]
-    return {**worst.to_dict(), "others": others.max() if len(others) else None}
+    found = {str(name): value for name, value in worst.items()}
+    return found | {"others": others.max() if len(others) else None}

@@ -1,10 +1,11 @@
 """Figures of the crane's report, after those of Rouvinen 1999; lengths in m until drawn."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
 
+from flexik.cases.crane.parts.fields import STROKES, deflection
 from flexik.cases.crane.report_mechanism import LINK_LOOKS, crane, links
 from flexik.cases.crane.report_results import Results
 from flexik.evaluation.errors import comparison
@@ -15,7 +16,6 @@ from flexik.reporting.report import Drawing, draw
 from flexik.reporting.style import MM
 
 X, Y = Axis("x (m)"), Axis("y (m)")
-STROKES = ("lift_stroke", "jib_stroke", "extension_stroke")
 ERROR_ROWS = {"error_x": "dX (mm)", "error_y": "dY (mm)", "error": "R (mm)"}
 CELL = 0.25  # m, side of a square of the error map
 # Variants of a method have its hue
@@ -39,16 +39,15 @@ def _looks(results: Results) -> dict:
 
 
 def _training_data(results: Results) -> dict[str, Drawing]:
-    kept, kinds_of = results.kept, {"rigid": "rigid tip", "tip": "flexible tip"}
-    bent = kept[["tip_x", "tip_y"]].to_numpy() - kept[["rigid_x", "rigid_y"]].to_numpy()
+    kept = results.kept
     found = {
         "training_points": _training_points(results),
         "test_points": _test_points(results),
         "initial_positions": _initial_positions(results),
         "sequences": _sequences(kept),
-        "normalised_deflection": _pair(bent, "deflection", "mm", MM),
+        "normalised_deflection": _pair(deflection(kept), "deflection", "mm", MM),
     }
-    for name, what in kinds_of.items():
+    for name, what in (("rigid", "rigid tip"), ("tip", "flexible tip")):
         values = kept[[f"{name}_x", f"{name}_y"]].to_numpy()
         found[f"normalised_{name}"] = _pair(values, what, "m", 1.0)
     for name, values in results.corrections.items():
@@ -60,9 +59,9 @@ def _training_data(results: Results) -> dict[str, Drawing]:
 def _training_points(results: Results) -> Drawing:
     """All training points, and enlarged those about the largest deflection."""
     kept = results.kept.sort_values("payload", ascending=False, kind="stable")
-    far = np.hypot(kept["tip_x"] - kept["rigid_x"], kept["tip_y"] - kept["rigid_y"]).idxmax()
-    x, y = kept.loc[far, "tip_x"], kept.loc[far, "tip_y"]
-    low, high = np.array([x - 0.6, y - 0.35]), np.array([x + 0.1, y + 0.55])
+    far = int(np.hypot(*deflection(kept).T).argmax())
+    tip = kept[["tip_x", "tip_y"]].to_numpy()[far]
+    low, high = tip - np.array([0.6, 0.35]), tip + np.array([0.1, 0.55])
     corners = np.array([low, [high[0], low[1]], high, [low[0], high[1]], low])
     frame = pd.DataFrame(corners, columns=["x", "y"]).assign(panel="all")
     rigid = kept.drop_duplicates(["rigid_x", "rigid_y"])
@@ -181,7 +180,9 @@ def _errors(results: Results) -> dict[str, Drawing]:
             *(over_workspace, "error", "method", Axis("error (mm)", MM, log=True)),
             looks=looks,
         ),
-        "tolerance_study": _tolerances(results.tolerances, results.published.tolerances, looks),
+        "tolerance_study": _tolerances(
+            results.tolerances, results.published["tolerance_study"], looks
+        ),
     }
     for label in results.methods:
         found[f"positioning_errors_{label}"] = _positioning_errors(
@@ -192,7 +193,9 @@ def _errors(results: Results) -> dict[str, Drawing]:
 
 
 def _comparison(results: Results) -> Drawing:
-    compared = comparison(results.statistics, results.published.errors, results.published_columns)
+    compared = comparison(
+        results.statistics, results.published["positioning_errors"], results.published_columns
+    )
     rows = [
         {
             "method": label,
@@ -322,7 +325,9 @@ def _sizes(results: Results) -> dict[str, Drawing]:
             sizes,
             chosen=size,
             published=published[name],
-            titles=_rule(results.networks[name].select.tolerance),
+            titles=f"Choice: smallest size within {tolerance:g} % of the least selection error"
+            if (tolerance := 100 * results.networks[name].select.tolerance)
+            else "Choice: size of the least selection error",
         )
     if found:
         frames = [sizes.assign(network=name) for name, (sizes, _) in results.studies.items()]
@@ -332,21 +337,13 @@ def _sizes(results: Results) -> dict[str, Drawing]:
             panel="network",
             chosen=chosen,
             published=published,
-            titles={name: f"{name}\n{_marks(chosen[name], published[name])}" for name in chosen},
+            titles={
+                name: f"{name}\nchosen {size}, published {published[name] or 'none'}"
+                for name, size in chosen.items()
+            },
             band=False,
         )
     return found
-
-
-def _rule(tolerance: float) -> str:
-    if tolerance > 0:
-        share = f"{100 * tolerance:g} %"
-        return f"Choice: smallest size with a selection error within {share} of the least"
-    return "Choice: size of the least selection error"
-
-
-def _marks(chosen: int, published: int | None) -> str:
-    return f"chosen {chosen}" + ("" if published is None else f", published {published}")
 
 
 def _race(curves: pd.DataFrame) -> Drawing:
@@ -364,16 +361,19 @@ def _race(curves: pd.DataFrame) -> Drawing:
 
 def _fitting(results: Results) -> Drawing:
     """Networks of several sizes along a slice (figures 2.9 and 2.10)."""
-    curves, samples = results.fitting, results.slice_samples
+    curves = results.fitting
+    samples = results.slice_samples.assign(y=lambda rows: rows["tip_y"] - rows["rigid_y"])
     sizes = sorted(curves["n_hidden"].unique())
     titles = {n: f"{n} hidden neurons" for n in sizes}
     if len(sizes) > 1:
         titles[sizes[0]] += ": too few"
         titles[sizes[-1]] += ": too many"
-    deflection = samples["tip_y"] - samples["rigid_y"]
-    shown = MM * np.concatenate([curves["model_y"], deflection])
-    low, high = _limits(shown, MM * curves["network_y"].to_numpy())
-    lift = "lift_stroke"
+    shown = MM * np.concatenate([curves["model_y"], samples["y"]])
+    # the network no further beyond truth and samples than half their range
+    allowed = 0.5 * np.ptp(shown)
+    network = np.clip(MM * curves["network_y"], shown.min() - allowed, shown.max() + allowed)
+    low, high = min(shown.min(), network.min()), max(shown.max(), network.max())
+    margin, lift = 0.05 * (high - low) or 1.0, "lift_stroke"
     ink = {"color": style.INK, "linewidth": 1.0}
     red, blue = {"color": style.VERMILION, "linewidth": 1.8}, {"markersize": 4.5}
     held = "grid samples, left out of the training"
@@ -381,22 +381,12 @@ def _fitting(results: Results) -> Drawing:
         chart,
         Layer(curves, lift, "model_y", "-", label="flexible model", look=ink),
         Layer(curves, lift, "network_y", "-", label="network", look=red),
-        Layer(samples.assign(y=deflection), lift, "y", "o", label=held, look=blue),
+        Layer(samples, lift, "y", "o", label=held, look=blue),
         x=Axis("lift stroke (m)"),
-        y=Axis("vertical deflection (mm)", MM, limits=(low, high)),
+        y=Axis("vertical deflection (mm)", MM, limits=(low - margin, high + margin)),
         panel="n_hidden",
         panels=sizes,
         titles=titles,
         columns=len(sizes),
         height=3.9,
     )
-
-
-def _limits(shown: Sequence[float], network: np.ndarray) -> tuple[float, float]:
-    """Limits of y: all truth and samples, and the network no further than half their range."""
-    low, high = float(np.min(shown)), float(np.max(shown))
-    allowed = 0.5 * (high - low)
-    network = np.clip(network, low - allowed, high + allowed)
-    low, high = min(low, float(network.min())), max(high, float(network.max()))
-    margin = 0.05 * (high - low) or 1.0
-    return low - margin, high + margin

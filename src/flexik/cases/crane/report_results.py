@@ -45,41 +45,16 @@ SELECTED = "_selected"
 
 
 @dataclass(frozen=True)
-class Published:
-    """Values of the thesis.
-
-    errors : statistics in mm, see evaluation.errors.comparison.
-    sizes : n_hidden by kind of network.
-    without_worst : a row for every point left out; method, x, y (m), max_error, mean_error (mm).
-    tolerances : method, tolerance, mean_iterations, max_iterations, and error_ratio, the mean
-        error over that at 1e-7.
-    operations : floating-point operations a query by method.
-    """
-
-    errors: pd.DataFrame
-    sizes: Mapping[str, int]
-    without_worst: pd.DataFrame
-    tolerances: pd.DataFrame
-    operations: Mapping[str, float]
-
-
-@dataclass(frozen=True)
 class Results:
     """What the stages found; lengths in m.
 
-    grid, selection : samples, kept ones and others.
-    errors, workspace : long tables of evaluation.errors by method, `none` among them, under the
-        published conditions and at random targets.
-    spread : mean and largest error with the network of every restart, by method, where it has one.
-    mesh : see multibody.crane.mesh_study.
+    errors, workspace : long tables of evaluation.errors by method, under the published conditions
+        and at random targets.
+    spread : mean and largest error with the network of every restart, by method that has one.
+    published : values of the thesis by file, errors in mm.
     training : a row for every restart of every network.
     studies : frame of learning.size_selection.by_size, and the chosen size, by network.
-    trained : trained networks by name.
-    tolerances : a row for every method and tolerance.
-    fitting : networks of several sizes along a line of poses.
-    query_times : microseconds a query by method, measured by a benchmark.
-    training_curves : error against seconds by trainer, measured by a benchmark.
-    shape : see report_mechanism.crane.
+    query_times, training_curves : measured by benchmarks.
     """
 
     section: Section
@@ -89,7 +64,7 @@ class Results:
     errors: Mapping[str, pd.DataFrame]
     workspace: Mapping[str, pd.DataFrame]
     spread: Mapping[str, pd.DataFrame]
-    published: Published
+    published: Mapping[str, pd.DataFrame]
     mesh: pd.DataFrame
     training: pd.DataFrame
     studies: Mapping[str, tuple[pd.DataFrame, int]]
@@ -153,8 +128,9 @@ class Results:
     @property
     def published_columns(self) -> dict[str, str | None]:
         """Published column that stands beside each method; None: there is none."""
+        known = self.published["positioning_errors"].columns
         return {
-            label: method.method if method.method in self.published.errors.columns else None
+            label: method.method if method.method in known else None
             for label, method in self.methods.items()
         }
 
@@ -177,7 +153,8 @@ class Results:
 
     def published_size(self, name: str) -> int | None:
         """Published n_hidden of the kind of network `name`; None if there is none."""
-        return self.published.sizes.get(self.kind(name))
+        sizes = self.published["network_sizes"].set_index("network")["n_hidden"]
+        return int(sizes[self.kind(name)]) if self.kind(name) in sizes else None
 
     def n_learnt(self, name: str) -> int:
         """Samples that network `name` learns from."""
@@ -200,27 +177,19 @@ class Results:
         n_steps = float(self.errors[label]["n_iterations"].mean())
         return normalisation_operations(network) + n_steps * step
 
-    def query_time(self, label: str, column: str) -> float | None:
-        """Microseconds of a query, measured alone or in a batch; None: not measured."""
-        times = self.query_times.set_index("method")[column]
-        return float(times[label]) if label in times.index else None
-
     def query_cost(self) -> pd.DataFrame:
         """Operations and microseconds of a query of every method, and its mean error."""
-        rows = []
-        for label, method in self.methods.items():
-            published = self.published.operations.get(method.method)
-            rows.append(
-                {
-                    "method": label,
-                    "operations": self.query_operations(label),
-                    "published": float(published) if published and label == method.method else None,
-                    "single (us)": self.query_time(label, "microseconds_single"),
-                    "batched (us)": self.query_time(label, "microseconds_batched"),
-                    "mean R (mm)": MM * self.statistics[label]["mean_error"],
-                }
-            )
-        return pd.DataFrame(rows).astype({"operations": float})
+        frame = pd.DataFrame({"method": list(self.methods)})
+        frame["operations"] = [self.query_operations(k) for k in frame["method"]]
+        theirs = self.published["operations"].set_index("method")["operations"].astype(float)
+        frame["published"] = [
+            theirs.get(k) if k == self.methods[k].method else None for k in frame["method"]
+        ]
+        times = self.query_times.set_index("method").reindex(frame["method"])
+        frame["single (us)"] = times["microseconds_single"].to_numpy()
+        frame["batched (us)"] = times["microseconds_batched"].to_numpy()
+        frame["mean R (mm)"] = [MM * self.statistics[k]["mean_error"] for k in frame["method"]]
+        return frame.astype({"operations": float, "published": float})
 
 
 def read(section: Section, data: Path) -> Results:
@@ -273,22 +242,19 @@ def read(section: Section, data: Path) -> Results:
     )
 
 
-def published() -> Published:
-    """Values of the thesis."""
-
-    def values(name: str, numbers: tuple[str, ...], *keys: str) -> pd.DataFrame:
-        texts = keys[:1]
-        return read_csv(REFERENCE / f"{name}.csv", numbers, texts, keys)
-
-    sizes = values("network_sizes", ("n_hidden",), "network")
-    operations = values("operations", ("operations",), "method")
-    methods = ("none", "combined", "direct", "modular", "inverse")
-    worst = ("x", "y", "max_error", "mean_error")
-    iterations = ("tolerance", "mean_iterations", "max_iterations", "error_ratio")
-    return Published(
-        errors=values("positioning_errors", methods, "statistic"),
-        sizes=dict(zip(sizes["network"], sizes["n_hidden"], strict=True)),
-        without_worst=values("without_worst_points", worst, "method", "x", "y"),
-        tolerances=values("tolerance_study", iterations, "method", "tolerance"),
-        operations=dict(zip(operations["method"], operations["operations"], strict=True)),
-    )
+def published() -> dict[str, pd.DataFrame]:
+    """Values of the thesis by file."""
+    files: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+        "positioning_errors": (
+            ("none", "combined", "direct", "modular", "inverse"),
+            ("statistic",),
+        ),
+        "network_sizes": (("n_hidden",), ("network",)),
+        "operations": (("operations",), ("method",)),
+        "without_worst_points": (("x", "y", "max_error", "mean_error"), ("method", "x", "y")),
+        "tolerance_study": (("mean_iterations", "max_iterations"), ("method", "tolerance")),
+    }
+    return {
+        name: read_csv(REFERENCE / f"{name}.csv", numbers, keys[:1], keys)
+        for name, (numbers, keys) in files.items()
+    }

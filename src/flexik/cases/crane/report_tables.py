@@ -76,7 +76,9 @@ def _errors(results: Results, group: str) -> Table:
     """Six statistics in mm, ours and the published one for every method; then the counts."""
     labels = [*(["none"] if group == "published" else []), *results.groups[group]]
     by_method = {label: results.statistics[label] for label in labels}
-    errors = comparison(by_method, results.published.errors, results.published_columns)
+    errors = comparison(
+        by_method, results.published["positioning_errors"], results.published_columns
+    )
     columns: dict[str, list[object]] = {
         "statistic": [*(STATISTIC_NAMES[str(name)] for name in errors.index), *COUNT_NAMES.values()]
     }
@@ -89,7 +91,9 @@ def _errors(results: Results, group: str) -> Table:
 
 def calibration(results: Results) -> pd.DataFrame:
     """Our six statistics without compensation beside the published ones."""
-    errors = comparison({"none": results.statistics["none"]}, results.published.errors)
+    errors = comparison(
+        {"none": results.statistics["none"]}, results.published["positioning_errors"]
+    )
     ours, theirs = errors["none"], errors["none published"]
     return pd.DataFrame(
         {
@@ -103,7 +107,7 @@ def calibration(results: Results) -> pd.DataFrame:
 
 def _without_worst(results: Results) -> Table:
     """Errors without the two points that the thesis leaves out, and without our worst two."""
-    published, rows = results.published.without_worst, []
+    published, rows = results.published["without_worst_points"], []
     for label in results.groups["published"]:
         theirs, frame = published[published["method"] == label], results.errors[label]
         if theirs.empty:
@@ -116,7 +120,7 @@ def _without_worst(results: Results) -> Table:
         }.items():
             if len(points) == len(theirs):
                 found = statistics_without(frame, points)
-                beside = theirs.iloc[0] if which == "published" else {}
+                beside: Any = theirs.iloc[0] if which == "published" else {}
                 rows.append(
                     {
                         "method": label,
@@ -157,15 +161,13 @@ def _inversions(results: Results) -> Table:
             "mean": results.errors[label]["n_iterations"].mean(),
             "max": int(results.errors[label]["n_iterations"].max()),
             "limited": int((results.errors[label]["n_clipped"] > 0).sum()),
-            "single": results.query_time(label, "microseconds_single"),
-            "batched": results.query_time(label, "microseconds_batched"),
         }
         for label, method in results.methods.items()
         if isinstance(method, InvertedSettings)
     ]
     columns = {"method": "method", "network": "network", "inversion": "kind"}
     return table(
-        rows,
+        pd.DataFrame(rows).merge(results.query_cost()) if rows else rows,
         {
             **columns,
             "tolerance": "tolerance",
@@ -175,14 +177,14 @@ def _inversions(results: Results) -> Table:
             "max iterations": "max",
             "failed": "n_failed",
             "at a limit": "limited",
-            "single (us)": Column("single", 0),
-            "batched (us)": "batched",
+            "single (us)": Column("single (us)", 0),
+            "batched (us)": "batched (us)",
         },
     )
 
 
 def _tolerances(results: Results) -> Table:
-    ours, theirs = results.tolerances, results.published.tolerances
+    ours, theirs = results.tolerances, results.published["tolerance_study"]
     merged = ours.merge(theirs, "left", ["method", "tolerance"], suffixes=("", "_published"))
     reference = ours[ours["tolerance"] == PUBLISHED_TOLERANCE].set_index("method")["mean_error"]
     merged["ratio"] = merged["mean_error"] / merged["method"].map(reference)
@@ -223,11 +225,10 @@ def _workspace(results: Results) -> Table:
 
 
 def _mesh(study: pd.DataFrame) -> Table:
-    columns: dict[str, str | Column] = {"element": "element"} if "element" in study else {}
     return table(
         study,
         {
-            **columns,
+            "element": "element",
             "refinement": "refinement",
             "mean tip difference (mm)": mm("mean_difference", 3),
             "max tip difference (mm)": mm("max_difference", 3),
