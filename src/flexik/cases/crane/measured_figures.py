@@ -1,6 +1,7 @@
 """Figures of a measuring campaign and of what a few measurements teach (Rouvinen 1999, 4.6)."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -124,7 +125,7 @@ def _achieved(errors: pd.DataFrame, target: np.ndarray) -> Drawing:
     for method, mark, face in (("none", "--", "white"), ("combined", "-", None)):
         of_method = rows[rows["method"] == method]
         path = {"color": style.GREY, "linewidth": 0.9, "marker": "o", "markersize": 7}
-        dot = {"markersize": 8, "markeredgewidth": 1.8}
+        dot: dict[str, Any] = {"markersize": 8, "markeredgewidth": 1.8}
         if face:
             path["markerfacecolor"] = dot["markerfacecolor"] = face
         layers += [

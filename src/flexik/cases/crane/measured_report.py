@@ -137,7 +137,7 @@ def _sensitivity(results: Measured) -> dict[str, Any]:
 def _points_said(points: pd.DataFrame) -> dict[str, Any]:
     """The thesis's remark on its points 2 and 3, checked in a `point_table`."""
     forces = points.filter(like="jib force")
-    loads = [label.split(", ")[1].removesuffix(" (kN)") for label in forces]
+    loads = [str(label).split(", ")[1].removesuffix(" (kN)") for label in forces]
     turns = forces.lt(0).any(axis=1) & forces.gt(0).any(axis=1)
     named = points[points["point"].isin(THESIS_POINTS)]
     columns = ["worse with (%)", "worse with, from reference (%)"]

@@ -208,7 +208,7 @@ def _expected_seats(twin: AsBuiltCrane, strokes: Array, payload: Array) -> list[
     loads = -gravity * payload[:, None] * [0.0, 1.0]
     forces = joint_forces(twin.crane, strokes, loads, gravity).joints
     tension = np.column_stack([forces[name] for name in RODS])
-    certain = (np.abs(tension) > SIGN_CERTAIN).all(axis=1)
+    certain = np.abs(tension).min(axis=1) > SIGN_CERTAIN
     lengths = np.copysign(_slack(twin.play), tension)
     return [
         (lengths[k], {p: _hung(twin.play[p], MIDDLE[1][p], forces[p][k]) for p in PIVOTS})

@@ -100,7 +100,8 @@ def errors_of(study: Study, number: int) -> Columns:
 
 def adapted_methods(study: Study, learnt: Measurements) -> dict[tuple[str, int], Method]:
     """Methods adapted to the first of the measurements `learnt`, by name and number of those."""
-    settings, found = study.adaptation, {}
+    settings = study.adaptation
+    found: dict[tuple[str, int], Method] = {}
     wrong = misjudged(settings.expected, settings.misjudged.share)
     for name, expected, numbers in (
         (ADAPTED, settings.expected, settings.n_measurements),

@@ -36,7 +36,7 @@ from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.machines.crane import Machine
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning import combined
-from flexik.positioning.method import Network
+from flexik.positioning.method import Method, Network
 
 
 def prepare(
@@ -112,7 +112,7 @@ def offset_table(offsets: Offsets, settings: Expected) -> pd.DataFrame:
 
 
 def commands(
-    crane: FlexibleCrane, nominal: combined.Combined, adapted: Adapted, campaign: pd.DataFrame
+    crane: FlexibleCrane, nominal: Method, adapted: Adapted, campaign: pd.DataFrame
 ) -> pd.DataFrame:
     """Strokes at every target and payload of the campaign, without and with adaptation."""
     if campaign[TARGET].isna().any(axis=None):
@@ -130,4 +130,5 @@ def commands(
 
 def _table(frame: pd.DataFrame, fields: tuple[Field, ...]) -> Writer:
     """Writer of `frame`, or of no rows."""
-    return table(stacked([frame] if len(frame) else [], fields), fields)
+    columns = [{str(name): frame[name].to_numpy() for name in frame}] if len(frame) else []
+    return table(stacked(columns, fields), fields)

@@ -1,6 +1,7 @@
 """Measuring on a crane as built: it is drawn, approached and measured."""
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning.method import Array
 
 Generator = np.random.Generator
+Name = TypeVar("Name", bound=Hashable)
 
 
 def twin_and_generator(
@@ -26,11 +28,11 @@ def twin_and_generator(
 
 def measured_tips(
     twin: AsBuiltCrane,
-    strokes: Mapping[str, Array],
+    strokes: Mapping[Name, Array],
     payload: Array,
     noise: float | None,
     generator: Generator,
-) -> dict[str, Array]:
+) -> dict[Name, Array]:
     """Measured tips (n, 2) in m by method, at commanded `strokes` (n, 3) in m by method.
 
     payload : (n,) in kg.
