@@ -1,6 +1,7 @@
 """Studies on cranes as built, and what the report says of the measured crane."""
 
 import dataclasses
+from pathlib import Path
 
 import crane_case
 import numpy as np
@@ -26,6 +27,7 @@ from flexik.multibody.crane.model import equilibrium
 from flexik.positioning.combined import Settings
 from flexik.positioning.method import Answer
 from flexik.positioning.none import Uncompensated
+from flexik.reporting.page import render
 
 NOMINAL = crane_case.crane(8.45e6)
 GEOMETRY = NOMINAL.geometry
@@ -383,6 +385,56 @@ def test_measurements_that_stand_out_and_what_does_not_fit_are_told(results):
     near = OFFSETS.assign(identified=0.0)
     found = said.values(dataclasses.replace(results, predictions=fits, offsets=near))
     assert not any(found["measured"]["predictions"][k] for k in ("out", "misfit", "far", "n_alone"))
+
+
+def page(results):
+    """Text of the part measured.md.j2, sentences on one line each."""
+    content = said.content(results)
+    template = Path(said.__file__).with_name("measured.md.j2")
+    return render(template, content.tables, content.figures, content.values).text
+
+
+def test_the_page_says_what_was_found(results):
+    text = page(results)
+    for sentence in (
+        "stands in for it, so single values cannot agree",
+        "Mean R of 20 cranes whose deviations are drawn with these sizes, and the least and "
+        "largest mean of one of them, mm: without 10.0 (10.0 to 10.0); with 4.9 (4.3 to 5.3);",
+        "Other payloads than published, so nothing stands beside those over all.",
+        "beyond the vertical in points 1 and 2, in the thesis in points 2 and 3,",
+        "it pushes in point 2 (172 kg); elsewhere",
+        "in point 2, play changes sides: loaded, the compensated tip lies 9.7 mm from the point of "
+        "reference, elsewhere 1.0 mm.",
+        "on which it does so here, from either: 2: 67 % and 67 %; 3: 0 % and 0 %. The remark is",
+        "the shares are 2: 100 % and 100 %; 3: 0 % and 0 %.",
+        "over the networks of 3 starts, each on a crane without deviations, the shares are 2: 100",
+        "with those of 3 starts 8.0 mm to 8.0 mm from the target and 7.3 mm to 7.3 mm from the",
+        "repeatability matters most for it: 3 times as large, it makes 7.8 mm.",
+        "1 of 3 measurements stand out from what the others say and are left out",
+        "point): 8 (40, 86 kg, 3.100, 1.000 m).",
+        "measurements lie 3.4 times as far from their predictions as they should",
+        "an error of the origin or of units makes too: lift_pivot_x (10).",
+        "Measurements with too few others to be predicted from: 1.",
+        "and of the adapted one at the 1 targets and payloads of the campaign.",
+    ):
+        assert sentence in text
+
+
+def test_the_page_says_what_a_campaign_of_a_file_lacks(results):
+    file = MEASURED.campaign.model_copy(update={"file": "own.csv"})
+    measured = MEASURED.model_copy(update={"campaign": file})
+    studies = SECTION.studies.model_copy(update={"measured": measured})
+    own = dataclasses.replace(results, section=SECTION.model_copy(update={"studies": studies}))
+    assert "The measurements are those of `own.csv`" in page(own)
+    unknown = results.campaign.assign(target_x=np.nan, target_y=np.nan, method="")
+    nothing = {name: getattr(results, name)[:0] for name in ("predictions", "offsets", "commands")}
+    text = page(
+        dataclasses.replace(own, campaign=unknown, restarts=results.restarts[:0], **nothing)
+    )
+    assert "It has no targets, so there are no tables of errors and no commands." in text
+    assert "nothing is identified from it." in text
+    assert "starts" not in text
+    assert text.count("![") == 1
 
 
 def test_tables_have_the_published_values_of_their_payloads_beside_ours(results):

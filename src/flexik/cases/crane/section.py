@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from flexik.cases.crane.measured_section import Measured
+from flexik.cases.crane.parts.measured.campaign_file import own_campaign
 from flexik.errors import DataError, ParameterError
 from flexik.kinematics.crane import check_assembly, smallest_extension
 from flexik.kinematics.crane_manipulator import geometry_of
@@ -255,6 +256,8 @@ def check(section: Section) -> None:
         raster = np.column_stack([x, y])[x >= section.samples.minimum_tip_x]
         if np.isnan(smallest_extension(geometry, raster)).all():
             raise ParameterError(f"params.yaml: crane.{key}: the crane reaches nothing in x, y")
+    if measured.campaign.file is not None:
+        own_campaign(measured.campaign.file, geometry)
 
 
 def _area(given: Any) -> tuple[tuple[float, float], tuple[float, float]]:
