@@ -28,7 +28,7 @@ repro: $(VENV)/.pipeline ## run the pipeline; only what changed is computed
 	$(BIN)/dvc repro
 
 smoke: $(VENV)/.pipeline ## the same pipeline on a tiny configuration, in a temporary copy
-	PYTHONPATH=src $(BIN)/python profiles/run.py profiles/smoke.yaml
+	$(BIN)/python profiles/run.py profiles/smoke.yaml
 
 test: $(VENV)/.dev ## all tests
 	$(BIN)/python -m pytest -q -n auto --maxprocesses 4 --dist loadgroup
