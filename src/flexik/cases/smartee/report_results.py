@@ -19,10 +19,10 @@ from flexik.reporting.style import MM, require
 
 DATA, BENCHMARKS = Path("data/smartee"), Path("reports/benchmarks")
 PUBLISHED_FILE = Path("data/reference/smartee/peaks.csv")
-# Errors by the name they have in metrics and in the file of published peaks, and its units
+# Errors by the name they have in metrics and in the file of published peaks
 QUANTITIES = {"elbow": "error", "position": "position_error", "orientation": "orientation_error"}
-UNITS = {"elbow": "rad", "position": "mm", "orientation": "rad"}
-FACTORS = {"rad": 1.0, "mm": MM}
+# Published unit, and the SI unit in it
+UNITS = {"elbow": ("rad", 1.0), "position": ("mm", MM), "orientation": ("rad", 1.0)}
 # Quantities of tables, in thousandths of SI units
 LABELS = {"elbow": "elbow (mrad)", "position": "position (mm)", "orientation": "orientation (mrad)"}
 # The published peaks, and a tenth of them, are the goals of the two networks
@@ -137,13 +137,13 @@ def published_peaks(table: pd.DataFrame) -> dict[str, float]:
     """Peaks in SI units by quantity; raises DataError if one is missing, or cannot be."""
     require("published peaks", table["quantity"].tolist(), QUANTITIES)
     rows = table.set_index("quantity").to_dict("index")
-    for quantity, expected in UNITS.items():
+    for quantity, (expected, _) in UNITS.items():
         unit, peak = rows[quantity]["unit"], rows[quantity]["peak"]
         if unit != expected or not 0.0 < peak < np.inf:
             raise DataError(
                 f"published peaks: {quantity} is {peak:g} {unit}, expected above 0 in {expected}"
             )
-    return {quantity: rows[quantity]["peak"] / FACTORS[unit] for quantity, unit in UNITS.items()}
+    return {quantity: rows[quantity]["peak"] / factor for quantity, (_, factor) in UNITS.items()}
 
 
 def current(table: pd.DataFrame, key: Callable[[dict], str | None]) -> pd.DataFrame:

@@ -143,7 +143,7 @@ def centre_elbows(machine: Machine, box: Box) -> Array:
     """Elbows (3,) at the centre of the box, the plate level; ParameterError when out of reach."""
     found = inverse(geometry_of(machine), np.array([box.centre]), np.eye(3)[None])
     if found.status[0] != REACHED:
-        raise ParameterError("smartee.samples.box.centre: the legs do not reach it")
+        raise ParameterError("params.yaml: smartee.samples.box.centre: the legs do not reach it")
     return found.joints[0, :, 2]
 
 
@@ -156,7 +156,7 @@ def check_reach(section: Section) -> None:
     }
     sets |= {f"conditions.{name}": poses for name, poses in section.conditions.items()}
     for key, poses in sets.items():
-        reached(section.machine, box, poses, f"smartee.{key}")
+        reached(section.machine, box, poses, f"params.yaml: smartee.{key}")
 
 
 def values(rows: pd.DataFrame, fields: tuple[Field, ...]) -> Array:
