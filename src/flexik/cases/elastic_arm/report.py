@@ -174,7 +174,7 @@ def gauges_table(results: Results) -> Table:
         difference = MM * (results.shown(noise)[names] - model).abs()
         frame[f"mean difference, {noise.replace('_', '-')}"] = difference.mean()
         frame[f"max difference, {noise.replace('_', '-')}"] = difference.max()
-    return Table(frame, dict.fromkeys(frame.columns[2:], 5))
+    return Table(frame, dict.fromkeys(map(str, frame.columns[2:]), 5))
 
 
 def selected(results: Results) -> list[str]:
@@ -186,7 +186,7 @@ def size_table(name: str) -> Table:
     """Errors of every size of a study."""
     sizes = by_size(of(f"sizes/{name}"))
     counts = [c for c in sizes if str(c).startswith(("n_", "best_"))]
-    errors = [c for c in sizes if str(c).endswith("_error")]
+    errors = [str(c) for c in sizes if str(c).endswith("_error")]
     return Table(sizes.astype(dict.fromkeys(counts, int)), dict.fromkeys(errors, 6))
 
 
@@ -242,10 +242,9 @@ def sensitivity_values(results: Results) -> dict[str, Any]:
     worst = str(off.drop(NOTHING).idxmax())
     rows = rows[(rows["network"] == results.main) & (rows["input"] == worst)]
     same = alike(results, "trainer", "n_hidden", "learns")
-    by_noise = {
-        results.section.networks[name].readings: results.fits.loc[name, "mean_error"]
-        for name in reversed(same)
-    }
+    errors = results.fits["mean_error"].to_dict()
+    networks = results.section.networks
+    by_noise = {str(networks[name].readings): errors[name] for name in reversed(same)}
     free, noisy, voltages = (by_noise.get(noise, np.nan) for noise in gauges.SHOWN)
     return {
         "off": off.to_dict(),

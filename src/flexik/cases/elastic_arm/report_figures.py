@@ -5,7 +5,8 @@ import pandas as pd
 
 from flexik.cases.elastic_arm.parts.gauges import FREE_OF_NOISE, NOISY
 from flexik.cases.elastic_arm.parts.readings import ANGLES, HELD_OUT
-from flexik.cases.elastic_arm.report_results import R, Results, of
+from flexik.cases.elastic_arm.report_results import R, Results
+from flexik.cases.elastic_arm.report_results import of as table_of
 from flexik.evaluation.regression import correlation
 from flexik.reporting import kinds, plane, style
 from flexik.reporting.chart import Axis, Layer, chart
@@ -76,12 +77,12 @@ def deformation(results: Results, link: int) -> Drawing:
     without noise.
     """
     # at 0 no force acts along link 1
-    readings = of("samples/readings")
+    readings = table_of("samples/readings")
     rows = np.isclose(readings["theta_1"], readings["theta_1"].max())
     readings = readings[rows]
     exact, noisy = (results.shown(noise)[rows] for noise in (FREE_OF_NOISE, NOISY))
     dx, dy, dphi = (f"{name}_{link}" for name in ("dx", "dy", "dphi"))
-    panels = {
+    panels: dict[str, tuple[Axis, pd.Series, pd.Series | None]] = {
         "dx of the model": (Axis("dx (mm)", MM), readings[dx], None),
         "dx by the gauges": (Axis("dx (um)", MICRO), exact[dx], noisy[dx]),
         "dy": (Axis("dy (mm)", MM), readings[dy], noisy[dy]),
@@ -89,20 +90,20 @@ def deformation(results: Results, link: int) -> Drawing:
     }
 
     pose = readings[["theta_2", "payload"]]
-    lines, dots = (
-        pd.concat(
-            pose.assign(value=of_panel[which], panel=panel)
-            for panel, of_panel in panels.items()
-            if of_panel[which] is not None
-        )
-        for which in (1, 2)
-    )
+    lines = [pose.assign(value=of[1], panel=panel) for panel, of in panels.items()]
+    dots = [
+        pose.assign(value=of[2], panel=panel) for panel, of in panels.items() if of[2] is not None
+    ]
     return draw(
         chart,
-        Layer(lines, "theta_2", "value", "-", "payload", label="{:g} kg"),
-        Layer(dots, "theta_2", "value", ".", "payload", label="", look={"markersize": 3.5}),
+        Layer(pd.concat(lines), "theta_2", "value", "-", "payload", label="{:g} kg"),
+        Layer(
+            *(pd.concat(dots), "theta_2", "value", ".", "payload"),
+            label="",
+            look={"markersize": 3.5},
+        ),
         x=Axis("theta_2 (deg)", DEGREES),
-        y={panel: of_panel[0] for panel, of_panel in panels.items()},
+        y={panel: of[0] for panel, of in panels.items()},
         panel="panel",
         columns=2,
         share="x",

@@ -3,6 +3,7 @@
 import functools
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -123,10 +124,11 @@ class Results:
     @functools.cached_property
     def positioning(self) -> pd.DataFrame:
         """Methods by name: statistics at the random targets, m, and where they come from."""
-        rows = {}
+        rows: dict[str, dict[str, Any]] = {}
         for label, frame in self.errors.items():
             method, error = self.section.methods[label], frame["error"]
-            row = {**workspace_statistics(frame), "clipped": int((frame["n_clipped"] > 0).sum())}
+            row: dict[str, Any] = dict(workspace_statistics(frame))
+            row["clipped"] = int((frame["n_clipped"] > 0).sum())
             row["n_worse"] = int((error > self.errors[self.uncompensated]["error"]).sum())
             near = self.near_payloads(frame)
             row |= {"n_near": int(near.sum()), "near": error[near].mean()}

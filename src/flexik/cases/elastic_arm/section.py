@@ -281,8 +281,8 @@ class Section(Model):
                     f"methods.{label}.network: {given.network!r} is no network given gauges "
                     f"({', '.join(self.gauge_networks)})"
                 )
-        for label, given in self.methods.items():
-            if label in self.networks and given.network != label:
+        for label, method_of in self.methods.items():
+            if label in self.networks and method_of.network != label:
                 raise ValueError(f"methods.{label}: the name of another network than its own")
         for name in (*self.networks, *self.methods):
             if name in TAKEN_NAMES:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flexik.cases.elastic_arm.parts.arm import flexible_arm
 from flexik.cases.elastic_arm.parts.gauge_method import GaugeNetwork
 from flexik.cases.elastic_arm.parts.kinds import KINDS
-from flexik.cases.elastic_arm.parts.readings import FIELDS
+from flexik.cases.elastic_arm.parts.readings import FIELDS, SAMPLES
 from flexik.cases.elastic_arm.parts.trained import RESTART, Trained, files_of, restarts
 from flexik.cases.elastic_arm.section import Gauge, Machine, Network, Section
 from flexik.datasets.parts import Part, Work, Writer, stacked, table
@@ -24,7 +24,6 @@ from flexik.multibody.elastic_arm import FlexibleArm, equilibria
 from flexik.positioning import registry
 from flexik.positioning.method import Array, Columns, Ingredients, Method, Settings
 
-SAMPLES = "data/elastic_arm/samples"
 QUERY = (
     Field("target_x", "m", "target, forward"),
     Field("target_y", "m", "target, upward"),
@@ -133,8 +132,8 @@ def written(
         rows = [
             {
                 **network.row,
-                "mean_error": [np.mean(found["error"])],
-                "max_error": [np.max(found["error"])],
+                "mean_error": np.mean(found["error"], keepdims=True),
+                "max_error": np.max(found["error"], keepdims=True),
             }
             for network, found in zip(trained, results, strict=True)
             if network is not None

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexik.kinematics.elastic_arm import DEFORMATION, ArmGeometry
+from flexik.kinematics.elastic_arm import DEFORMATION
+from flexik.kinematics.manipulator import Manipulator
 from flexik.kinematics.status import REACHED
 from flexik.positioning.method import Answer, Array, Network, checked, planar
 
@@ -27,7 +28,7 @@ class GaugeNetwork:
     own error is not known, so such rows count as reached.
     """
 
-    geometry: ArmGeometry
+    manipulator: Manipulator
     network: Network
     inputs: tuple[str, ...]
     deformation: Array
@@ -36,12 +37,12 @@ class GaugeNetwork:
         """See `flexik.positioning.method.Method`."""
         targets, _ = planar(query)
         deformation = checked("deformation by the gauges", self.deformation, len(targets), 6)
-        rigid = self.geometry.inverse(targets, current).values
+        rigid = self.manipulator.inverse(targets, current).values
         known = dict(zip(DEFORMATION, deformation.T, strict=True))
         known |= {"p_x": targets[:, 0], "p_y": targets[:, 1]}
-        known["elbow"] = self.geometry.branch(rigid)[:, 0]
+        known["elbow"] = self.manipulator.branch(rigid)[:, 0]
         asked = np.column_stack([known[name] for name in self.inputs])
         predicted = checked("predicted angles", self.network.predict(asked), len(targets), 2)
-        values = np.clip(predicted, self.geometry.lower, self.geometry.upper)
+        values = np.clip(predicted, self.manipulator.lower, self.manipulator.upper)
         n_clipped = np.sum(values != predicted, axis=1)
         return Answer(values, np.full(len(targets), REACHED), {"n_clipped": n_clipped})

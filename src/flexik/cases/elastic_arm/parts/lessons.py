@@ -4,12 +4,11 @@ from pathlib import Path
 from typing import Any
 
 from flexik.cases.elastic_arm.parts.kinds import KINDS, LearningData, learning_data
+from flexik.cases.elastic_arm.parts.readings import SAMPLES
 from flexik.cases.elastic_arm.section import Network, Section
 from flexik.learning.perceptron import quantities
 from flexik.learning.training import Architecture, Lesson
 from flexik.parameters.trainers import Stopping
-
-SAMPLES = "data/elastic_arm/samples"
 
 
 def described(section: Section, name: str, trainer: str) -> dict[str, dict[str, Any]]:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from flexik.cases.elastic_arm.parts import evaluate, gauges, study_splits
+from flexik.cases.elastic_arm.parts.readings import SAMPLES
 from flexik.cases.elastic_arm.parts.study_gauges import prepare_fit, prepare_sensitivity
 from flexik.cases.elastic_arm.parts.trained import Trained, files_of
 from flexik.cases.elastic_arm.section import Gauge, Section
@@ -61,8 +62,8 @@ def _gauge_part(
         "networks": {network: section.networks[network] for network in networks},
     }
     inputs = {
-        "readings": f"{evaluate.SAMPLES}/readings.parquet",
-        "shown": {s: f"{evaluate.SAMPLES}/readings.{s}.parquet" for s in gauges.SHOWN},
+        "readings": f"{SAMPLES}/readings.parquet",
+        "shown": {s: f"{SAMPLES}/readings.{s}.parquet" for s in gauges.SHOWN},
         "files": {network: files_of(network) for network in networks},
     }
     return Part(name, prepare, common | settings, inputs)

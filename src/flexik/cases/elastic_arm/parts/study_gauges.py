@@ -12,7 +12,7 @@ from flexik.cases.elastic_arm.parts import gauges
 from flexik.cases.elastic_arm.parts.arm import flexible_arm
 from flexik.cases.elastic_arm.parts.kinds import KINDS, learning_table
 from flexik.cases.elastic_arm.parts.readings import ANGLES, HELD_OUT, TRAINING
-from flexik.cases.elastic_arm.parts.trained import RESTART, Trained, restarts
+from flexik.cases.elastic_arm.parts.trained import NETWORK, RESTART, Trained, restarts
 from flexik.cases.elastic_arm.section import Machine, Network
 from flexik.datasets.parts import Work, Writer, rows, stacked, table
 from flexik.datasets.tables import Field, read_table
@@ -23,7 +23,6 @@ from flexik.multibody.elastic_arm import equilibria
 Array = NDArray[np.float64]
 Columns = Mapping[str, NDArray]
 
-NETWORK = Field("network", "1", "name of the network", "string")
 FIT_FIELDS = (
     NETWORK,
     Field("reading", "1", "row of the readings, from 0", "int64"),
@@ -107,10 +106,7 @@ def _fit(machine: Machine, tables: Mapping[str, pd.DataFrame], trained: Trained)
 
 
 def _written(trained: Sequence[Trained], results: Sequence[Columns]) -> dict[str, Writer]:
-    statistics = [
-        {**found, **network.row, "network": [network.name]}
-        for network, found in zip(trained, results, strict=True)
-    ]
+    statistics = [{**found, **network.row} for network, found in zip(trained, results, strict=True)]
     fits = [
         {
             "network": np.full(len(found["angles"]), network.name),
@@ -139,9 +135,8 @@ def _sensitivity(machine: Machine, tables: Mapping[str, pd.DataFrame], trained: 
     for name, off in changes.items():
         angles = trained.network.predict(inputs + off * (np.array(names) == name))
         errors.append(_tip_error(machine, angles, readings).mean())
-    row = {"network": [trained.name], **trained.row}
     return {
-        **{key: np.repeat(value, len(changes)) for key, value in row.items()},
+        **{key: np.repeat(value, len(changes)) for key, value in trained.row.items()},
         "input": np.array(list(changes)),
         "change": np.array(list(changes.values())),
         "mean_error": np.array(errors),

@@ -4,12 +4,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from flexik.cases.elastic_arm.section import Network
 from flexik.datasets.tables import Field
 from flexik.learning import perceptron
 from flexik.learning.storage import load_network, load_restarts
 
 NETWORKS = "data/elastic_arm/networks"
+NETWORK = Field("network", "1", "name of the network", "string")
 RESTART = (
     Field("restart", "1", "number of the start, from 0", "int64"),
     Field("chosen", "1", "1: of the least selection error, else 0", "int64"),
@@ -32,9 +36,13 @@ class Trained:
         return str(self.settings.learns)
 
     @property
-    def row(self) -> dict[str, list[int]]:
-        """Columns RESTART."""
-        return {"restart": [self.restart], "chosen": [int(self.is_chosen)]}
+    def row(self) -> dict[str, NDArray]:
+        """Columns (1,) of NETWORK and RESTART."""
+        return {
+            "network": np.array([self.name]),
+            "restart": np.array([self.restart]),
+            "chosen": np.array([int(self.is_chosen)]),
+        }
 
 
 def files_of(name: str) -> dict[str, str]:
