@@ -10,10 +10,9 @@ import pandas as pd
 
 from flexik.cases.crane.measured_section import Budget, Campaign
 from flexik.cases.crane.parts.crane import flexible
-from flexik.cases.crane.parts.measured.campaign import approaches
 from flexik.cases.crane.parts.measured.errors import campaign_errors
 from flexik.cases.crane.parts.measured.fields import BUDGET, MEASURED
-from flexik.cases.crane.parts.measured.nominal import read_network
+from flexik.cases.crane.parts.measured.nominal import approaches, read_network
 from flexik.cases.crane.parts.measured.twins import measured_tips, twin_and_generator
 from flexik.datasets.parts import Columns, Work, Writer, stacked, table
 from flexik.learning.storage import load_restarts

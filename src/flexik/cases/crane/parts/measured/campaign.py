@@ -13,21 +13,15 @@ from flexik.cases.crane.measured_section import Campaign
 from flexik.cases.crane.parts.crane import flexible
 from flexik.cases.crane.parts.measured.campaign_file import own_campaign
 from flexik.cases.crane.parts.measured.fields import CAMPAIGN
-from flexik.cases.crane.parts.measured.nominal import (
-    commanded,
-    compensating,
-    read_network,
-    uncompensated,
-)
+from flexik.cases.crane.parts.measured.nominal import approaches, read_network
 from flexik.cases.crane.parts.measured.twins import measured_tips, twin_and_generator
 from flexik.datasets.parts import Work, Writer, table, whole
-from flexik.evaluation.conditions import every
 from flexik.kinematics.crane_manipulator import geometry_of
 from flexik.machines.crane import Machine
 from flexik.multibody.crane.as_built import Magnitudes
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning import combined
-from flexik.positioning.method import Array, Network
+from flexik.positioning.method import Array
 
 
 def prepare_own(*, machine: Machine, file: Path) -> Work:
@@ -50,15 +44,6 @@ def prepare(
     crane = flexible(machine, spring)
     strokes, query = approaches(crane, method, read_network(network), campaign)
     return whole(measure, crane=crane, campaign=campaign, strokes=strokes, query=query)
-
-
-def approaches(
-    crane: FlexibleCrane, method: combined.Settings, network: Network, campaign: Campaign
-) -> tuple[dict[str, Array], Array]:
-    """Strokes (n, 3) commanded by each of fields.METHODS at the query (n, 3) of the campaign."""
-    query, _ = every(campaign.points, campaign.payloads)
-    methods = {"none": uncompensated(crane), "combined": compensating(crane, method, network)}
-    return commanded(crane, methods, query), query
 
 
 def measure(

@@ -1,8 +1,9 @@
 """Methods that position the nominal crane, with networks of other stages."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
+from flexik.cases.crane.measured_section import Campaign
+from flexik.evaluation.conditions import every
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.learning.storage import load_network
 from flexik.multibody.crane.structure import FlexibleCrane
@@ -26,9 +27,11 @@ def uncompensated(crane: FlexibleCrane) -> Method:
     return Uncompensated(CraneManipulator(crane.geometry))
 
 
-def commanded(
-    crane: FlexibleCrane, methods: Mapping[str, Method], query: Array
-) -> dict[str, Array]:
-    """Strokes (n, 3) in m of `methods` at `query` (n, 3), from the published initial positions."""
+def approaches(
+    crane: FlexibleCrane, method: combined.Settings, network: Network, campaign: Campaign
+) -> tuple[dict[str, Array], Array]:
+    """Strokes (n, 3) commanded by each of fields.METHODS at the query (n, 3) of the campaign."""
+    query, _ = every(campaign.points, campaign.payloads)
+    methods = {"none": uncompensated(crane), "combined": compensating(crane, method, network)}
     current = CraneManipulator(crane.geometry).initial_positions(query[:, :2])
-    return {name: method(query, current).values for name, method in methods.items()}
+    return {name: method(query, current).values for name, method in methods.items()}, query
