@@ -202,7 +202,7 @@ def test_unreachable_targets_are_flagged(geometry):
         *(OUT_OF_REACH, OUT_OF_REACH, ACTUATOR_LIMIT, REACHED, ACTUATOR_LIMIT)
     ]
     assert solution.reached.tolist() == [False, False, False, True, False]
-    assert set(STATUS_MEANING) == {REACHED, OUT_OF_REACH, ACTUATOR_LIMIT}
+    assert {REACHED, OUT_OF_REACH, ACTUATOR_LIMIT} < set(STATUS_MEANING)
 
 
 def test_nan_stands_for_out_of_reach_and_for_nothing_else(geometry):

@@ -57,7 +57,11 @@ def parts(section: Section) -> list[Part]:
 
 def _part(section: Section, conditions: str, name: str) -> Part:
     given, method = section.conditions[conditions], section.methods[name]
-    settings = {"machine": section.machine, "name": name, **method_settings(section, name)}
+    settings = {
+        "machine": section.machine,
+        "name": f"{conditions}/{name}",
+        **method_settings(section, name),
+    }
     inputs = {**model_inputs(section), **method_inputs(section, name)}
     if isinstance(given, Points):
         settings["points"] = given
