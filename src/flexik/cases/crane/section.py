@@ -168,6 +168,8 @@ class Section(Model):
         for name, kind in (("published", Points), ("workspace", RandomTargets)):
             if not isinstance(self.conditions.get(name), kind):
                 raise ValueError(f"conditions.{name}: expected {kind.__name__}, which is reported")
+        if taken := self.conditions.keys() & type(self.samples).model_fields.keys():
+            raise ValueError(f"conditions.{min(taken)}: the name is taken")
         return self
 
     def _check_strokes(self) -> None:

@@ -18,13 +18,7 @@ NETWORKS, SAMPLES = DATA / "networks", DATA / "samples"
 
 
 def method_settings(section: Section, name: str) -> dict[str, Any]:
-    """Settings `method` and `build` of a part that asks method `name` of params.yaml.
-
-    Raises ParameterError if there is no such method.
-    """
-    if name not in section.methods:
-        known = ", ".join(section.methods)
-        raise ParameterError(f"crane.methods: there is no {name!r} ({known})")
+    """Settings `method` and `build` of a part that asks method `name` of params.yaml."""
     method = section.methods[name].model_copy(update={"n_targets": None})
     return {"method": method, "build": build_of(method)}
 
@@ -53,7 +47,13 @@ def trained_method(
 
 
 def method_of(section: Section, name: str) -> Method:
-    """Method `name` of params.yaml, read from the data of the pipeline."""
+    """Method `name` of params.yaml, read from the data of the pipeline.
+
+    Raises ParameterError if there is no such method.
+    """
+    if name not in section.methods:
+        known = ", ".join(section.methods)
+        raise ParameterError(f"crane.methods: there is no {name!r} ({known})")
     manipulator = CraneManipulator(geometry_of(section.machine))
     inputs = method_inputs(section, name)
     return trained_method(**method_settings(section, name), manipulator=manipulator, **inputs)
