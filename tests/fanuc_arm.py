@@ -1,8 +1,15 @@
-"""The arm of params.yaml, written down once more, and poses to test it with."""
+"""The arm of the machine file, written down once more, and poses to test it with."""
+
+from pathlib import Path
 
 import numpy as np
 
+from flexik.cases import case as cases
 from flexik.kinematics.serial_arm import SerialArm
+from flexik.parameters.reading import read_yaml
+
+ROOT = Path(__file__).parents[1]
+FILES = {name: read_yaml(ROOT / name) for name in ("params.yaml", "data/machines/fanuc.yaml")}
 
 LIMITS = np.deg2rad([[-180, -90, -160, -360, -125, -360], [180, 135, 280, 360, 125, 360]])
 ARM = SerialArm(
@@ -17,3 +24,16 @@ ARM = SerialArm(
 
 def random_joints(n, seed=0):
     return np.random.default_rng(seed).uniform(*LIMITS, (n, 6))
+
+
+def section(data, machine=FILES["data/machines/fanuc.yaml"]):
+    """The section of changed contents of params.yaml."""
+    known = {"params.yaml": data, "data/machines/fanuc.yaml": machine}
+    read, cases._read = cases._read, lambda file: known[str(file)]
+    try:
+        return cases.load("fanuc")
+    finally:
+        cases._read = read
+
+
+SECTION = section(FILES["params.yaml"])

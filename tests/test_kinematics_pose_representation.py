@@ -5,15 +5,17 @@ import dataclasses
 import numpy as np
 from fanuc_arm import ARM, random_joints
 
-from flexik.kinematics.fanuc import canonical, configuration, inverse
 from flexik.kinematics.pose_representation import (
     INPUTS,
     OUTPUTS,
+    asked,
     joint_outputs,
     joints_of,
     pose_inputs,
+    queries,
 )
 from flexik.kinematics.serial_arm import forward, pose_errors
+from flexik.kinematics.spherical_wrist import canonical, configuration, inverse
 
 
 def test_joints_come_back_from_what_is_learnt():
@@ -40,6 +42,8 @@ def test_inputs_are_position_and_rotation():
     assert values.shape == (3, len(INPUTS))
     assert np.array_equal(values[:, :3], pose.position)
     assert np.array_equal(values[:, 3:].reshape(3, 3, 3), pose.rotation)
+    found, number = asked(queries(pose, np.array([3, 0, 7])))
+    assert all(map(np.array_equal, found, pose)) and number.tolist() == [3, 0, 7]
 
 
 def test_nothing_jumps_where_angles_wrap_or_the_arm_is_singular():

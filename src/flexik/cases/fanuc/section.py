@@ -178,6 +178,8 @@ class Section(Model):
                     f"samples.path.region.{number}: reaches beyond the limits of the joint"
                 )
         check_networks(self.networks, self.trainers)
+        for name, network in self.networks.items():
+            self._check_network(name, network)
         self._check_methods()
         for name in ("n_hidden", "learning_factor"):
             self._check_study(name)
@@ -189,8 +191,6 @@ class Section(Model):
                 raise ValueError(
                     f"conditions.off_path.distances.{number}: prints as {one}, as the entry before"
                 )
-        for name, network in self.networks.items():
-            self._check_network(name, network)
         return self
 
     def _check_methods(self) -> None:
@@ -215,6 +215,9 @@ class Section(Model):
             raise ValueError(f"{key}.learns: expected one of {', '.join(N_INPUTS)}")
         if network.is_selected:
             raise ValueError(f"{key}.n_hidden: expected numbers, sizes are not selected here")
+        if network.learns != "arm_configuration" and len(network.layers) != 1:
+            # those of one joint each are joined layer by layer
+            raise ValueError(f"{key}.n_hidden: expected one layer, got {len(network.layers)}")
         samples = self.samples
         whole = network.learns == "arm_configuration"
         n, source = (

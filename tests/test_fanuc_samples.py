@@ -1,39 +1,30 @@
 """Taught path, targets beside it and random poses of the six-joint arm."""
 
 import dataclasses
-from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
-from fanuc_arm import ARM
+from fanuc_arm import ARM, SECTION
 
-from flexik.datasets.fanuc import samples
-from flexik.datasets.fanuc.samples import all_configurations, beside, nearest_on, taught_path
-from flexik.datasets.fanuc.tables import (
-    evaluation_checksum,
-    network_checksum,
-    path_checksum,
-    poses_checksum,
-    query_checksum,
-    study_checksum,
-    workspace_network_checksum,
-)
+from flexik.cases.fanuc.parts import generate, samples
+from flexik.cases.fanuc.parts.samples import beside, random_joints, taught_path
+from flexik.cases.fanuc.parts.tables import JOINT_FIELDS, QUERY_FIELDS, array
+from flexik.datasets.parallel import ParallelSettings
+from flexik.datasets.parts import make
+from flexik.datasets.tables import read_table
 from flexik.errors import ParameterError
-from flexik.kinematics.fanuc import canonical, configuration, inverse
+from flexik.kinematics.pose_representation import asked
 from flexik.kinematics.serial_arm import Pose, forward, jacobian
-from flexik.parameters import load_parameters, overlay, read_yaml, validate
+from flexik.kinematics.spherical_wrist import canonical, configuration, inverse
+from flexik.positioning.interpolated import nearest_on
 
-ROOT = Path(__file__).parents[1]
-
-
-@pytest.fixture(scope="module")
-def fanuc():
-    return load_parameters(ROOT / "params.yaml").fanuc
+PATH = SECTION.samples.path
 
 
-def test_the_path_is_smooth_and_at_rest_at_its_ends(fanuc):
-    path = taught_path(ARM, fanuc.path)
-    n = fanuc.path.n_training + fanuc.path.n_test
+def test_the_path_is_smooth_and_at_rest_at_its_ends():
+    path = taught_path(ARM, PATH)
+    n = PATH.n_training + PATH.n_test
     assert path.joints.shape == (n, 6) and path.share[[0, -1]].tolist() == [0.0, 1.0]
     step = path.share[1]
     velocity, acceleration = (np.diff(path.joints, n=k, axis=0) / step**k for k in (1, 2))
@@ -43,8 +34,8 @@ def test_the_path_is_smooth_and_at_rest_at_its_ends(fanuc):
     assert (jumps < 0.05 * np.abs(acceleration).max(axis=0)).all()
 
 
-def test_the_path_of_params_yaml_keeps_away_from_trouble(fanuc):
-    joints = taught_path(ARM, fanuc.path).joints
+def test_the_path_of_params_yaml_keeps_away_from_trouble():
+    joints = taught_path(ARM, PATH).joints
     assert ARM.within_limits(joints).all()
     assert len(np.unique(configuration(ARM, joints))) == 1
     assert np.linalg.svd(jacobian(ARM, joints), compute_uv=False)[:, -1].min() > 0.1
@@ -55,24 +46,24 @@ def test_the_path_of_params_yaml_keeps_away_from_trouble(fanuc):
     assert distance[apart].min() > 0.05
 
 
-def test_test_samples_lie_between_training_samples(fanuc):
-    is_test = taught_path(ARM, fanuc.path).is_test
-    assert is_test.sum() == fanuc.path.n_test
+def test_test_samples_lie_between_training_samples():
+    is_test = taught_path(ARM, PATH).is_test
+    assert is_test.sum() == PATH.n_test
     assert not is_test[[0, -1]].any()
     assert set(np.diff(np.flatnonzero(is_test))) == {3}
-    uneven = fanuc.path.model_copy(update={"n_training": 50, "n_test": 21})
+    uneven = PATH.model_copy(update={"n_training": 50, "n_test": 21})
     counted = taught_path(ARM, uneven).is_test
     assert counted.sum() == 21 and np.ptp(np.diff(np.flatnonzero(counted))) <= 1
 
 
-def test_a_path_beyond_the_limits_is_refused(fanuc):
+def test_a_path_beyond_the_limits_is_refused():
     tight = dataclasses.replace(ARM, maximum=(*ARM.maximum[:5], 0.1))
-    with pytest.raises(ParameterError, match=r"fanuc\.path: .* J6"):
-        taught_path(tight, fanuc.path)
+    with pytest.raises(ParameterError, match=r"fanuc\.samples\.path: .* J6"):
+        taught_path(tight, PATH)
 
 
-def test_targets_beside_a_path_are_at_their_distance_from_all_of_it(fanuc):
-    pose = forward(ARM, taught_path(ARM, fanuc.path).joints)
+def test_targets_beside_a_path_are_at_their_distance_from_all_of_it():
+    pose = forward(ARM, taught_path(ARM, PATH).joints)
     rows = np.arange(5, 595, 10)
     distances = [0.0, 0.02, 0.3]
     found = beside(pose, rows, distances, seed=1)
@@ -112,17 +103,24 @@ def test_the_nearest_point_of_a_path_by_hand():
     assert found.distance == pytest.approx([0.3, 1.0, 0.5, np.sqrt(2.0)])
 
 
+def drawn(arm, n, role=0):
+    """Numbers and joints of all arm configurations, `n` each."""
+    items = generate.prepare_poses(arm=arm, n=n, seed=3, role=role, length=None).items
+    frame = pd.concat(pd.DataFrame(generate.random_poses(item)) for item in items)
+    return frame["configuration"].to_numpy(), array(frame, JOINT_FIELDS)
+
+
 def test_random_joints_keep_limits_of_another_range():
     shifted = dataclasses.replace(
         ARM, minimum=(-1.1, *ARM.minimum[1:]), maximum=(6.0, *ARM.maximum[1:])
     )
-    numbers, joints = all_configurations(shifted, 200, seed=3, role=0)
+    numbers, joints = drawn(shifted, 200)
     assert shifted.within_limits(joints).all() and joints[:, 0].max() > np.pi
     assert np.array_equal(configuration(shifted, joints), numbers)
 
 
 def test_random_joints_are_of_their_configuration_and_within_limits():
-    numbers, joints = all_configurations(ARM, 300, seed=3, role=0)
+    numbers, joints = drawn(ARM, 300)
     assert np.array_equal(np.bincount(numbers), [300] * 8)
     assert np.array_equal(configuration(ARM, joints), numbers)
     assert ARM.within_limits(joints).all()
@@ -133,10 +131,9 @@ def test_random_joints_are_of_their_configuration_and_within_limits():
 
 
 def test_sets_of_one_seed_are_apart_and_do_not_depend_on_their_length():
-    one, other = (all_configurations(ARM, 50, seed=3, role=role)[1] for role in (0, 1))
+    one, other = (drawn(ARM, 50, role)[1] for role in (0, 1))
     assert not set(one[:, 0]) & set(other[:, 0])
-    longer = all_configurations(ARM, 80, seed=3, role=0)[1]
-    assert np.array_equal(longer[:50], one[:50])
+    assert np.array_equal(drawn(ARM, 80)[1][:50], one[:50])
 
 
 def test_a_configuration_that_does_not_occur_is_told(monkeypatch):
@@ -144,41 +141,27 @@ def test_a_configuration_that_does_not_occur_is_told(monkeypatch):
     minimum, maximum = list(ARM.minimum), list(ARM.maximum)
     minimum[1:3], maximum[1:3] = [0.0, 0.0], [0.1, 0.1]
     forwards = dataclasses.replace(ARM, minimum=tuple(minimum), maximum=tuple(maximum))
-    with pytest.raises(ParameterError, match=r"fanuc\.joints: 0 of .* arm configuration 4"):
-        samples.random_joints(forwards, 4, 10, np.random.default_rng(0))
+    with pytest.raises(ParameterError, match=r"0 of .* arm configuration 4"):
+        random_joints(forwards, 4, 10, np.random.default_rng(0))
 
 
-CHECKSUMS = {
-    "path": path_checksum,
-    "poses": poses_checksum,
-    "config1": lambda fanuc: network_checksum(fanuc, "config1"),
-    "study": study_checksum,
-    "workspace": workspace_network_checksum,
-    "evaluation": evaluation_checksum,
-    "query": query_checksum,
-}
-
-
-@pytest.mark.parametrize(
-    ("change", "expected"),
-    [
-        ({"path": {"seed": 2}}, ["path", "config1", "study", "evaluation"]),
-        ({"networks": {"config1": {"seed": 2}}}, ["config1", "study", "evaluation"]),
-        ({"networks": {"config2": {"n_restarts": 2}}}, ["evaluation"]),
-        ({"networks": {"config2": {"n_hidden": 8}}}, ["evaluation", "query"]),
-        ({"trainers": {"back_propagation": {"momentum": 0.8}}}, ["config1", "evaluation"]),
-        ({"trainers": {"study": {"momentum": 0.8}}}, ["study"]),
-        ({"trainers": {"adam": {"beta_1": 0.8}}}, ["workspace", "evaluation"]),
-        ({"workspace": {"n_targets": 5}}, ["poses", "workspace", "evaluation"]),
-        ({"workspace": {"n_hidden": [5]}}, ["workspace", "evaluation", "query"]),
-        ({"off_path": {"seed": 6}}, ["evaluation"]),
-        ({"refinement": {"damping": 1.0}}, ["evaluation", "query"]),
-        ({"success": {"position": 1.0}}, []),
-    ],
-    ids=str,
-)
-def test_checksums_follow_what_they_depend_on(change, expected):
-    data = read_yaml(ROOT / "params.yaml")
-    before, after = (validate(d).fanuc for d in (data, overlay(data, {"fanuc": change})))
-    found = [name for name, of in CHECKSUMS.items() if of(before) != of(after)]
-    assert sorted(found) == sorted(expected)
+def test_targets_are_reached_by_the_configuration_that_is_asked_for(tmp_path, monkeypatch):
+    monkeypatch.setattr(generate, "SAMPLES", tmp_path)
+    off_path = SECTION.conditions.off_path.model_copy(update={"distances": [0.0, 0.01, 5.0]})
+    poses = SECTION.conditions.random_poses.model_copy(update={"n_targets": 5})
+    conditions = SECTION.conditions.model_copy(update={"off_path": off_path, "random_poses": poses})
+    few = SECTION.samples.model_copy(update={"n_poses": 4})
+    parts = generate.parts(SECTION.model_copy(update={"conditions": conditions, "samples": few}))
+    make(tmp_path, parts, ParallelSettings(n_workers=1))
+    tables = {p.name: read_table(tmp_path / f"{p.name}.parquet") for p in parts}
+    assert {name: len(tables[name]) for name in ("path", "poses")} == {"path": 600, "poses": 32}
+    for name, n in (("path", 200), ("off_path", 400), ("random_poses", 40)):
+        frame = tables[f"conditions/{name}"]
+        target, number = asked(array(frame, QUERY_FIELDS))
+        assert len(frame) == n
+        assert inverse(ARM, target).reached[np.arange(n), number].all()
+    assert set(tables["conditions/off_path"]["distance"]) == {0.0, 0.01}
+    random = tables["conditions/random_poses"]
+    assert (random["singular_value"] > 0.0).all() and random["singular"].sum() == 0
+    test = tables["conditions/path"]
+    assert np.array_equal(test[["x", "y", "z"]], forward(ARM, array(test, JOINT_FIELDS)).position)

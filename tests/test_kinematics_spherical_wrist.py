@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform
 
 from flexik.errors import ParameterError
-from flexik.kinematics.fanuc import (
+from flexik.kinematics.serial_arm import Pose, forward, jacobian, pose_errors
+from flexik.kinematics.spherical_wrist import (
     ELBOW,
     N_CONFIGURATIONS,
     SHOULDER,
@@ -24,7 +25,6 @@ from flexik.kinematics.fanuc import (
     reach,
     wrapped,
 )
-from flexik.kinematics.serial_arm import Pose, forward, jacobian, pose_errors
 from flexik.kinematics.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
 
 N_ROUND_TRIP = 100_000
