@@ -17,7 +17,7 @@ from flexik.cases.smartee.parts.poses import (
     geometry_of,
     inputs_of,
 )
-from flexik.cases.smartee.parts.study import linear_error
+from flexik.cases.smartee.parts.starts import linear_error
 from flexik.datasets.tables import write_table
 from flexik.errors import ParameterError
 from flexik.evaluation.errors import evaluate

@@ -10,9 +10,9 @@ from test_smartee_poses import draw, rows
 
 from flexik.cases.smartee import report_starts, report_tables
 from flexik.cases.smartee.parts.errors import COLUMNS, conditions_of, judge_of
+from flexik.cases.smartee.parts.geometries import conditions
 from flexik.cases.smartee.parts.methods import DirectKinematics
 from flexik.cases.smartee.parts.poses import POSE_FIELDS, extent_of, geometry_of, values
-from flexik.cases.smartee.parts.study import conditions
 from flexik.cases.smartee.report import TEMPLATE, content
 from flexik.cases.smartee.report_results import Results, current, published_peaks, scientific
 from flexik.errors import DataError

@@ -41,9 +41,9 @@ class Results:
     restarts : network, and RESTART_FIELDS of parts.evaluate
     training : network, and a row for every restart
     starts, sensitivity : FIELDS of learning.starts; trainer of the latter is the pair of constants
-    linear_error : see parts.study
+    linear_error : see parts.starts
     sizes : poses, and columns of learning.size_selection.by_size
-    geometries : GEOMETRY_FIELDS of parts.study
+    geometries : GEOMETRY_FIELDS of parts.geometries
     published : peak by quantity of QUANTITIES, SI units
     query_times : microseconds_single and microseconds_batched by method and n_steps, measured by a
         benchmark with the parameters there are now; may be empty
@@ -96,7 +96,13 @@ def read(section: Section) -> Results:
         errors=_named(errors, "method", "conditions"),
         restarts=_named(restarts, "network"),
         training=_named(training, "network"),
-        starts=read_table(studies / "starts.parquet"),
+        starts=pd.concat(
+            [
+                read_table(studies / f"starts_{name}.parquet")
+                for name in section.studies.starts.trainers
+            ],
+            ignore_index=True,
+        ),
         sensitivity=read_table(studies / "sensitivity.parquet"),
         linear_error=float(read_json(studies / "linear.json")["mean_squared_error"]),
         sizes=_named(by, "poses"),
