@@ -70,38 +70,37 @@ def metrics(results: Results) -> dict[str, float | None]:
 
 def tables(results: Results) -> dict[str, Table]:
     """All tables by name."""
-    fits = results.fits.reset_index()
+    sets = {
+        "training_": "training",
+        "": "held out",
+        "targets_": "targets",
+        "published_": "published",
+    }
     r_columns = {
         f"R {angle}, {title}": Column(f"{which}{r}", 6 if title == "published" else 8)
-        for which, title in (
-            *(("training_", "training"), ("", "held out")),
-            *(("targets_", "targets"), ("published_", "published")),
-        )
+        for which, title in sets.items()
         for angle, r in zip(ANGLES, R, strict=True)
     }
-    training = pd.concat(
-        [
-            pd.read_csv(DATA / f"networks/{name}.restarts.csv").assign(
-                network=name, hidden=results.hidden(name)
-            )
-            for name in results.section.networks
-        ]
-    )
+    fit_columns = {
+        **{name: name for name in ("network", "hidden", "trainer", "gauges")},
+        **r_columns,
+        "mean tip error (mm)": mm("mean_error"),
+        "max tip error (mm)": mm("max_error"),
+        "mean tip error by restart (mm)": "mean_errors",
+    }
+    runs = {
+        name: pd.read_csv(DATA / f"networks/{name}.restarts.csv").assign(
+            hidden=results.hidden(name)
+        )
+        for name in results.section.networks
+    }
+    training = pd.concat(runs, names=["network"]).reset_index("network")
     front = ["network", "hidden", "restart"]
     training = training[[*front, *(name for name in training if name not in front)]]
     return {
         "sensitivity": sensitivity_table(),
         "positioning_errors": positioning_table(results),
-        "fit": table(
-            fits,
-            {
-                **{name: name for name in ("network", "hidden", "trainer", "gauges")},
-                **r_columns,
-                "mean tip error (mm)": mm("mean_error"),
-                "max tip error (mm)": mm("max_error"),
-                "mean tip error by restart (mm)": "mean_errors",
-            },
-        ),
+        "fit": table(results.fits.reset_index(), fit_columns),
         "splits": splits_table(results),
         "gauges": gauges_table(results),
         "training": Table(training, {"training_error": 6, "selection_error": 6}),

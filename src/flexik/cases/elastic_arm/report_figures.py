@@ -1,5 +1,7 @@
 """Figures of the elastic arm: frames for the kinds of figures of the kit."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
@@ -7,7 +9,6 @@ from flexik.cases.elastic_arm.parts.gauges import FREE_OF_NOISE, NOISY
 from flexik.cases.elastic_arm.parts.readings import ANGLES, HELD_OUT
 from flexik.cases.elastic_arm.report_results import R, Results
 from flexik.cases.elastic_arm.report_results import of as table_of
-from flexik.evaluation.regression import correlation
 from flexik.reporting import kinds, plane, style
 from flexik.reporting.chart import Axis, Layer, chart
 from flexik.reporting.report import Drawing, draw
@@ -25,8 +26,9 @@ def figures(results: Results) -> dict[str, Drawing]:
     """All figures by name."""
     frames = results.errors.items()
     errors = pd.concat([frame.assign(method=label) for label, frame in frames])
-    looks = style.looks(results.errors)
-    shown = [label for label in results.errors if label not in hidden_methods(results)]
+    shown = errors[~errors["method"].isin(hidden_methods(results))]
+    error, place = Axis("error (mm)", MM, log=True), ("target_x", "target_y", "error", "method")
+    distribution = draw(kinds.distribution, errors, "error", "method", error, what="targets")
     return {
         **{f"deformation_link_{link}": deformation(results, link) for link in (1, 2)},
         **{
@@ -34,25 +36,8 @@ def figures(results: Results) -> dict[str, Drawing]:
             for name in shown_networks(results)
         },
         "network_comparison": network_comparison(results),
-        "error_distribution": draw(
-            kinds.distribution,
-            errors,
-            "error",
-            "method",
-            Axis("error (mm)", MM, log=True),
-            what="targets",
-            looks=looks,
-        ),
-        "error_over_targets": draw(
-            plane.maps,
-            errors[errors["method"].isin(shown)],
-            "target_x",
-            "target_y",
-            "error",
-            "method",
-            label="error (mm)",
-            scale=MM,
-        ),
+        "error_distribution": distribution,
+        "error_over_targets": draw(plane.maps, shown, *place, label="error (mm)", scale=MM),
     }
 
 
@@ -82,28 +67,25 @@ def deformation(results: Results, link: int) -> Drawing:
     readings = readings[rows]
     exact, noisy = (results.shown(noise)[rows] for noise in (FREE_OF_NOISE, NOISY))
     dx, dy, dphi = (f"{name}_{link}" for name in ("dx", "dy", "dphi"))
-    panels: dict[str, tuple[Axis, pd.Series, pd.Series | None]] = {
-        "dx of the model": (Axis("dx (mm)", MM), readings[dx], None),
-        "dx by the gauges": (Axis("dx (um)", MICRO), exact[dx], noisy[dx]),
-        "dy": (Axis("dy (mm)", MM), readings[dy], noisy[dy]),
-        "dphi": (Axis("dphi (mrad)", MM), readings[dphi], noisy[dphi]),
+    panels: dict[str, dict[str, Any]] = {
+        "dx of the model": {"axis": Axis("dx (mm)", MM), "lines": readings[dx]},
+        "dx by the gauges": {"axis": Axis("dx (um)", MICRO), "lines": exact[dx], "dots": noisy[dx]},
+        "dy": {"axis": Axis("dy (mm)", MM), "lines": readings[dy], "dots": noisy[dy]},
+        "dphi": {"axis": Axis("dphi (mrad)", MM), "lines": readings[dphi], "dots": noisy[dphi]},
     }
-
     pose = readings[["theta_2", "payload"]]
-    lines = [pose.assign(value=of[1], panel=panel) for panel, of in panels.items()]
-    dots = [
-        pose.assign(value=of[2], panel=panel) for panel, of in panels.items() if of[2] is not None
-    ]
+    lines, dots = (
+        pd.concat(
+            [pose.assign(value=of[k], panel=panel) for panel, of in panels.items() if k in of]
+        )
+        for k in ("lines", "dots")
+    )
     return draw(
         chart,
-        Layer(pd.concat(lines), "theta_2", "value", "-", "payload", label="{:g} kg"),
-        Layer(
-            *(pd.concat(dots), "theta_2", "value", ".", "payload"),
-            label="",
-            look={"markersize": 3.5},
-        ),
+        Layer(lines, "theta_2", "value", "-", "payload", label="{:g} kg"),
+        Layer(dots, "theta_2", "value", ".", "payload", label="", look={"markersize": 3.5}),
         x=Axis("theta_2 (deg)", DEGREES),
-        y={panel: of[0] for panel, of in panels.items()},
+        y={panel: of["axis"] for panel, of in panels.items()},
         panel="panel",
         columns=2,
         share="x",
@@ -119,34 +101,27 @@ def target_and_network(results: Results, name: str) -> Drawing:
     held_out = table["part"] == HELD_OUT
     frames, titles = [], {}
     for quantity in PAIRS:
-        pair = table[[quantity, f"network_{quantity}"]]
-        frames.append(pair.set_axis(["target", "network"], axis=1).assign(quantity=quantity))
-        r = correlation(*(pair[held_out].to_numpy()[:, [k]] for k in (0, 1)))[0]
+        pair = table[[quantity, f"network_{quantity}"]].set_axis(["target", "network"], axis=1)
+        part = np.where(held_out, "held out", "training and selection")
+        frames.append(pair.assign(quantity=quantity, part=part))
+        r = float(pair[held_out].corr().to_numpy()[0, 1])
         titles[quantity] = f"{quantity}: R = {r:.6f}"
         if np.isfinite(published.get(quantity, np.nan)):
             titles[quantity] += f" (published {published[quantity]:.6f})"
-    every = pd.concat(frames).reset_index(drop=True)
-    of_held_out = np.tile(held_out.to_numpy(), len(PAIRS))
-    ends = every.groupby("quantity", sort=False)["target"].agg(["min", "max"])
-    line = ends.reset_index().melt("quantity", value_name="target")
-    line["network"] = line["target"]
+    every = pd.concat(frames).sort_values("part", ascending=False, kind="stable")
+    line = every.assign(network=every["target"])
     return draw(
         chart,
         Layer(line, "target", "network", look={"color": style.INK, "linewidth": 0.8}),
-        Layer(
-            *(every[~of_held_out], "target", "network", "o"),
-            label="training and selection",
-            look={"color": style.SKY, "markersize": 3.0},
-        ),
-        Layer(
-            *(every[of_held_out], "target", "network", "o"),
-            label="held out",
-            look={"color": style.VERMILION, "markersize": 3.6},
-        ),
+        Layer(every, "target", "network", "o", "part", look={"markersize": 3.2}),
+        looks={
+            "training and selection": {"color": style.SKY},
+            "held out": {"color": style.VERMILION},
+        },
         x={k: Axis(f"target {axis.label}", axis.scale) for k, axis in PAIRS.items()},
         y={k: Axis(f"network {axis.label}", axis.scale) for k, axis in PAIRS.items()},
-        panel="quantity",
         titles=titles,
+        panel="quantity",
         columns=2,
         share="",
         height=7.2,
@@ -156,24 +131,13 @@ def target_and_network(results: Results, name: str) -> Drawing:
 def network_comparison(results: Results) -> Drawing:
     """One minus R of both angles on held-out readings by network (after figures 19 to 22)."""
     fits = results.fits
+    names = [f"{name} ({hidden})" for name, hidden in fits["hidden"].items()]
+    columns = {r: {"ours": 1.0 - fits[r], "published": 1.0 - fits[f"published_{r}"]} for r in R}
     rows = [
-        pd.DataFrame(
-            {
-                "network": [f"{name} ({hidden})" for name, hidden in fits["hidden"].items()],
-                "angle": angle,
-                "ours": 1.0 - fits[r],
-                "published": 1.0 - fits[f"published_{r}"],
-            }
-        )
+        pd.DataFrame({"network": names, "angle": angle, **columns[r]})
         for angle, r in zip(ANGLES, R, strict=True)
     ]
-    return draw(
-        kinds.beside,
-        pd.concat(rows),
-        "network",
-        "ours",
-        "published",
-        Axis("1 \N{MINUS SIGN} R on held-out readings (less is better)", log=True, least=ROUND_OFF),
-        hue="angle",
-        numbers="",
-    )
+    label = "1 \N{MINUS SIGN} R on held-out readings (less is better)"
+    x = Axis(label, log=True, least=ROUND_OFF)
+    names_of = ("network", "ours", "published", x)
+    return draw(kinds.beside, pd.concat(rows), *names_of, hue="angle", numbers="")
