@@ -1,7 +1,7 @@
 """Errors of a method on conditions as one long table, and the statistics published of them."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
@@ -113,7 +113,7 @@ def check(frame: pd.DataFrame, columns: Columns) -> None:
     outside = (answers < np.array(columns.lower) - LIMIT_TOLERANCE) | (
         answers > np.array(columns.upper) + LIMIT_TOLERANCE
     )
-    wrong: dict[str, pd.DataFrame] = {
+    wrong: dict[str, Any] = {
         "query not finite": ~np.isfinite(frame[[field.name for field in columns.query]]),
         "status unknown": ~frame[[STATUS.name]].isin(list(STATUS_MEANING)),
         "answer not finite": ~np.isfinite(answers[reached]),

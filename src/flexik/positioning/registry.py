@@ -67,12 +67,12 @@ def check_methods(methods: Mapping[str, Settings], networks: Mapping[str, Networ
             if method.network is not None:
                 raise ValueError(f"methods.{name}.network: {method.method} needs none")
             continue
-        if method.network not in networks:
+        network = networks.get(method.network or "")
+        if network is None:
             raise ValueError(
                 f"methods.{name}.network: there is no network {method.network!r} "
                 f"({', '.join(networks)})"
             )
-        network = networks[method.network]
         learnt = network.learns or "correction"
         if learnt != method.needs:
             raise ValueError(
