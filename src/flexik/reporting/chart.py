@@ -107,7 +107,7 @@ def chart(
     height: float | None = None,
     width: float = style.WIDTH,
     widths: Sequence[float] | None = None,
-    share: str = "xy",
+    share: str | None = None,
     equal: bool = False,
     legend: str = "",
 ) -> Figure:
@@ -118,7 +118,7 @@ def chart(
     titles : by panel (default: its name, "" for none), or of the only one.
     looks : colour, line and marker by value of a hue, see style.looks.
     columns, width, height, widths : panels in a row; inches; relative widths of the columns.
-    share : "x", "y", "xy" or "": axes that all panels have in common.
+    share : "x", "y", "xy" or "": axes that all panels have in common; None: those not by panel.
     equal : one scale for x and y.
     legend : its heading.
 
@@ -132,6 +132,8 @@ def chart(
     height = height or 1.1 + (4.0 if len(names) == 1 else 2.5) * rows
     figure = Figure(figsize=(width, height))
     options: dict[str, Any] = {"squeeze": False, "width_ratios": widths}
+    if share is None:
+        share = "".join(k for k, axis in zip("xy", (x, y), strict=True) if isinstance(axis, Axis))
     grid = figure.subplots(rows, columns, sharex="x" in share, sharey="y" in share, **options)
     hues = {value: None for layer in layers if layer.hue for value in layer.frame[layer.hue]}
     looks = {**style.looks(hues), **(looks or {})}

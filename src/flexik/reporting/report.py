@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from flexik.datasets.parallel import ParallelSettings, parallel_map
+from flexik.datasets.parallel import ParallelSettings, from_environment, parallel_map
 from flexik.errors import DataError
 from flexik.files import file_checksum, read_json, write_json, write_text
 from flexik.reporting import style
@@ -80,7 +80,6 @@ def write_report(
     *,
     sources: Mapping[str, str] | None = None,
     record: Path,
-    parallel: ParallelSettings | None = None,
 ) -> None:
     """Write README.md, metrics.json, tables (CSV, Markdown) and figures (PNG) into `folder`.
 
@@ -97,8 +96,6 @@ def write_report(
     record
         JSON file of what was written and drawn from what. A figure whose data and drawing code are
         those of the record is not drawn again; a file of the record that is no longer made goes.
-    parallel
-        Where figures are drawn.
 
     Raises
     ------
@@ -114,7 +111,7 @@ def write_report(
         texts["provenance.csv"] = rows.to_csv(index=False, lineterminator="\n")
     texts["README.md"] = page.text + (PROVENANCE if sources else "")
     earlier = read_json(record) if record.is_file() else {"files": [], "figures": {}}
-    drawn = _draw_all(folder, figures, earlier["figures"], parallel or ParallelSettings())
+    drawn = _draw_all(folder, figures, earlier["figures"])
     for name, text in texts.items():
         write_text(folder / name, text)
     write_json(folder / "metrics.json", dict(content.metrics))
@@ -125,10 +122,7 @@ def write_report(
 
 
 def _draw_all(
-    folder: Path,
-    figures: Mapping[str, Drawing],
-    earlier: Mapping[str, Any],
-    parallel: ParallelSettings,
+    folder: Path, figures: Mapping[str, Drawing], earlier: Mapping[str, Any]
 ) -> dict[str, list[str]]:
     """Draw what changed; checksums of data and code, and of the PNG, by name."""
     wanted = {name: digest(drawing) for name, drawing in figures.items()}
@@ -139,9 +133,9 @@ def _draw_all(
         if not path.is_file() or earlier.get(name) != [wanted[name], file_checksum(path)]
     ]
     jobs = [(paths[name], figures[name]) for name in todo]
-    if len(jobs) <= FEW and parallel.scheduler is None:
-        parallel = ParallelSettings(n_workers=1)
-    for _ in parallel_map(_draw, jobs, parallel, "figures"):
+    # here, never on a cluster: files are written
+    n_workers = 1 if len(jobs) <= FEW else from_environment(ParallelSettings()).n_workers
+    for _ in parallel_map(_draw, jobs, ParallelSettings(n_workers), "figures"):
         pass
     return {name: [wanted[name], file_checksum(path)] for name, path in paths.items()}
 

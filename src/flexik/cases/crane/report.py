@@ -82,59 +82,38 @@ def metrics(results: Results) -> dict[str, float]:
 
 def values(results: Results) -> dict[str, Any]:
     """What the sentences of the page say, by name."""
-    section, points = results.section, results.points
-    conditions = section.conditions
-    published_sizes = [
-        section.networks[method.network].n_hidden == results.published_size(method.network)
-        for label in results.groups["published"]
-        if (method := results.methods[label]).network
+    section, payload = results.section, results.errors["none"]["payload"]
+    trained = results.kept["payload"].min(), results.kept["payload"].max()
+    keys = ("method", "network", "n_corrections", "genetic", "inversion")
+    sizes = {results.methods[label].network: label for label in results.groups["published"]}
+    tolerance_of = [
+        section.methods[name].model_dump() for name in section.studies.tolerance.methods
     ]
-    payload, trained = results.errors["none"]["payload"], results.kept["payload"]
     return {
-        "methods": methods(results),
-        "groups": results.groups,
-        "n_conditions": results.statistics["none"]["n_conditions"],
-        "of_published_size": all(published_sizes),
-        "n_points": len(points),
-        "has_stand_in": (2.0, -3.95) in points,
-        "trained_payload": (trained.min(), trained.max()),
-        "n_extrapolated": int((~payload.between(trained.min(), trained.max())).sum()),
+        "results": results,
+        "section": section,
+        "methods": {
+            label: {key: getattr(method, key, None) for key in keys}
+            for label, method in results.methods.items()
+        },
+        "of_published_size": all(
+            section.networks[name].n_hidden == results.published_size(name)
+            for name in sizes
+            if name
+        ),
+        "has_stand_in": (2.0, -3.95) in results.points,
+        "trained_payload": trained,
+        "n_extrapolated": int((~payload.between(*trained)).sum()),
         "worse": worse(results.errors),
         "failures": failures(results.errors),
         "workspace_failures": failures(results.workspace),
-        "has_spread": bool(results.spread),
         "genetic": genetic(results.errors),
         "no_better": no_better(results),
-        "workspace": conditions["workspace"],
-        "least_trained_payload": section.samples.grid.payload.minimum,
-        "descends": all(
-            inversion["kind"] == "gradient_descent"
-            for inversion in (
-                section.methods[name].model_dump()["inversion"]
-                for name in section.studies.tolerance.methods
-            )
-        ),
+        "descends": all(m["inversion"]["kind"] == "gradient_descent" for m in tolerance_of),
         "has_cost": not results.query_cost().drop(columns="published").dropna().empty,
         "grid": counts(results.grid),
-        "minimum_tip_x": section.samples.minimum_tip_x,
-        "n_selection": len(results.selection),
-        "corrections": list(results.corrections),
-        "studies": studies(results),
-        "fitting": section.studies.fitting,
-        "spring_stiffness": results.spring_stiffness,
         "far": far_from_published(results),
         "worst": worst_condition(results.errors["none"]),
-        "mesh": results.mesh,
-        "element": section.machine.structure.element,
-    }
-
-
-def methods(results: Results) -> dict[str, dict[str, Any]]:
-    """What each method that compensates is, by name; None what it has not."""
-    keys = ("method", "network", "n_corrections", "genetic", "inversion")
-    return {
-        label: {key: getattr(method, key, None) for key in keys}
-        for label, method in results.methods.items()
     }
 
 
@@ -188,19 +167,6 @@ def no_better(results: Results) -> list[dict[str, Any]]:
                 }
             )
     return found
-
-
-def studies(results: Results) -> dict[str, dict[str, Any]]:
-    """Sizes tried and chosen, by network."""
-    return {
-        name: {
-            "chosen": chosen,
-            "published": results.published_size(name),
-            "n_restarts": results.networks[name].select.n_restarts,
-            "at_the_end": chosen in (sizes["n_hidden"].iloc[0], sizes["n_hidden"].iloc[-1]),
-        }
-        for name, (sizes, chosen) in results.studies.items()
-    }
 
 
 def far_from_published(results: Results) -> list[dict[str, Any]]:

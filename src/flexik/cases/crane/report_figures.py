@@ -67,23 +67,14 @@ def _training_points(results: Results) -> Drawing:
     rigid = kept.drop_duplicates(["rigid_x", "rigid_y"])
     plus = {"color": style.INK, "markersize": 5, "markeredgewidth": 0.7, "zorder": 2.6}
     parts = links(results.geometry, np.array(results.geometry.stroke_maximum)[None] / 2)
-    ink = {"color": style.INK, "linewidth": 0.9}
+    ink, tips = {"color": style.INK, "linewidth": 0.9}, ("tip_x", "tip_y")
+    dots, small = {"markersize": 5, "markeredgewidth": 0}, {"markersize": 3}
     return draw(
         chart,
         Layer(parts.assign(panel="all"), "x", "y", "-", "link", "piece", label=""),
         Layer(rigid, "rigid_x", "rigid_y", "+", label="rigid", look=plus),
-        Layer(
-            *(kept.assign(panel="all"), "tip_x", "tip_y", "."),
-            hue="payload",
-            label="{:g} kg",
-            look={"markersize": 3, "markeredgewidth": 0},
-        ),
-        Layer(
-            *(kept.assign(panel="enlarged"), "tip_x", "tip_y", "o"),
-            hue="payload",
-            label="",
-            look={"markersize": 5, "markeredgewidth": 0},
-        ),
+        Layer(kept.assign(panel="all"), *tips, ".", "payload", label="{:g} kg", look=dots | small),
+        Layer(kept.assign(panel="enlarged"), *tips, "o", "payload", label="", look=dots),
         Layer(frame, "x", "y", "-", label="", look=ink),
         x={"all": X, "enlarged": Axis("x (m)", limits=(low[0], high[0]))},
         y={"all": Y, "enlarged": Axis("y (m)", limits=(low[1], high[1]))},
@@ -95,7 +86,6 @@ def _training_points(results: Results) -> Drawing:
         },
         columns=2,
         widths=(1.6, 1),
-        share="",
         equal=True,
         height=8.6,
         looks=style.shades(kept["payload"]) | LINK_LOOKS,
@@ -127,7 +117,6 @@ def _initial_positions(results: Results) -> Drawing:
     parts["point"] = [names[k] for k in parts["crane"]]
     points = pd.DataFrame(results.points, columns=["x", "y"]).assign(point=names)
     dot = {"color": style.INK, "fillstyle": "none", "markersize": 5}
-    rows = -(-len(names) // 7)
     return draw(
         chart,
         Layer(parts, "x", "y", "-", hue="link", group="piece"),
@@ -137,7 +126,7 @@ def _initial_positions(results: Results) -> Drawing:
         panel="point",
         columns=7,
         equal=True,
-        height=0.9 + 1.95 * rows,
+        height=0.9 + 1.95 * np.ceil(len(names) / 7),
         looks=LINK_LOOKS,
     )
 
@@ -224,16 +213,10 @@ def _positioning_errors(none: pd.DataFrame, frame: pd.DataFrame, label: str) -> 
     names = frame.drop_duplicates("point").set_index("point")[["target_x", "target_y"]]
     grey = {"color": style.GREY, "fillstyle": "none", "markersize": 3.2}
     layers = [Layer(before, "point", "value", "o", label="uncompensated", look=grey)]
-    for rows, mark, text in (
-        (after[reached], "o", f"{label}: {{:g}} kg"),
-        (after[~reached], "x", ""),
-    ):
+    for rows, mark, text in ((after[reached], "o", label), (after[~reached], "x", "failed")):
         if len(rows):
+            text += ": {:g} kg"
             layers.append(Layer(rows, "point", "value", mark, hue="payload", label=text))
-    if not reached.all():
-        ink = {"color": style.INK}
-        failed = after[~reached][:1].assign(value=np.nan)
-        layers.append(Layer(pd.concat([failed, after[:1]]), "point", "value", "x", look=ink))
     return draw(
         kinds.strips,
         *layers,
@@ -245,7 +228,6 @@ def _positioning_errors(none: pd.DataFrame, frame: pd.DataFrame, label: str) -> 
         panel="row",
         titles=dict.fromkeys(ERROR_ROWS, ""),
         columns=1,
-        share="x",
         height=8.2,
         looks=style.shades(frame["payload"]),
     )
@@ -253,22 +235,17 @@ def _positioning_errors(none: pd.DataFrame, frame: pd.DataFrame, label: str) -> 
 
 def _tolerances(ours: pd.DataFrame, theirs: pd.DataFrame, looks: Mapping) -> Drawing:
     """Mean error and iterations against the tolerance of the search (chapter 4)."""
-    ours = ours.sort_values("tolerance").assign(error="error", iterations="iterations")
-    theirs = theirs.reset_index(drop=True).assign(iterations="iterations")
-    errors = ours.rename(columns={"error": "panel"})
-    counts, published = (f.rename(columns={"iterations": "panel"}) for f in (ours, theirs))
-    thin = {"linewidth": 0.7, "markersize": 2.5}
+    ours = ours.sort_values("tolerance")
+    errors, counts = (ours.assign(panel=panel) for panel in ("error", "iterations"))
+    published = theirs.assign(panel="iterations")
+    mean, thin = ("tolerance", "mean_iterations"), {"linewidth": 0.7, "markersize": 2.5}
     open_dot, small = {"fillstyle": "none", "markersize": 7}, {"fillstyle": "none"}
     return draw(
         chart,
         Layer(errors, "tolerance", "mean_error", "o-", "method", label="{}, mean"),
-        Layer(counts, "tolerance", "mean_iterations", "o-", "method", label=""),
+        Layer(counts, *mean, "o-", "method", label=""),
         Layer(counts, "tolerance", "max_iterations", "o-", "method", label="", look=thin),
-        Layer(
-            *(published, "tolerance", "mean_iterations", "o", "method"),
-            label="{}, published",
-            look=open_dot,
-        ),
+        Layer(published, *mean, "o", "method", label="{}, published", look=open_dot),
         Layer(published, "tolerance", "max_iterations", "o", "method", label="", look=small),
         x=Axis("tolerance (1)", log=True),
         y={
@@ -278,7 +255,6 @@ def _tolerances(ours: pd.DataFrame, theirs: pd.DataFrame, looks: Mapping) -> Dra
         panel="panel",
         titles={"error": "", "iterations": "iterations: mean, and largest (thin, small)"},
         columns=2,
-        share="x",
         height=4.6,
         looks=looks,
     )
@@ -309,7 +285,6 @@ def _cost(cost: pd.DataFrame, looks: Mapping) -> Drawing:
         panels=("operations", "time"),
         titles={"operations": "", "time": "alone (filled) or in a batch (open)"},
         columns=2,
-        share="y",
         height=4.8,
         looks=looks,
     )

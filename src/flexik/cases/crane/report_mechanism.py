@@ -19,30 +19,24 @@ Points = dict[str, Array]
 BEAMS = ("pillar", "lift", "jib", "extension")
 # Half of the depth drawn, m; the sections are known by their stiffness, not by their outline
 HALF_DEPTH = {"pillar": 0.085, "lift": 0.095, "jib": 0.085, "extension": 0.055}
-COLOUR = {
-    "pillar": "#5A5A5A",
-    "lift": style.BLUE,
-    "jib": style.VERMILION,
-    "extension": style.ORANGE,
-}
-RODS, CYLINDER = "rocker, coupler", "cylinder"
+COLOUR = dict(zip(BEAMS, ("#5A5A5A", style.BLUE, style.VERMILION, style.ORANGE), strict=True))
+# Colour and width of the links, and the corners that they are drawn through
 LINK_LOOKS = {
     "pillar": {"color": COLOUR["pillar"], "linewidth": 1.6},
-    CYLINDER: {"color": style.GREY, "linewidth": 0.7},
+    "cylinder": {"color": style.GREY, "linewidth": 0.7},
     "lift arm": {"color": COLOUR["lift"], "linewidth": 1.6},
-    RODS: {"color": style.GREEN, "linewidth": 0.7},
+    "rocker, coupler": {"color": style.GREEN, "linewidth": 0.7},
     "jib": {"color": COLOUR["jib"], "linewidth": 1.6},
     "extension": {"color": COLOUR["extension"], "linewidth": 1.6},
 }
-# Corners of the links drawn, in their order
 LINKS = (
-    ("pillar", ("foot", "lift_pivot")),
-    (CYLINDER, ("lift_cylinder_base", "lift_cylinder_head")),
-    (CYLINDER, ("jib_cylinder_base", "rocker_head")),
-    ("lift arm", ("lift_pivot", "jib_pivot")),
-    (RODS, ("rocker_pivot", "rocker_head", "coupler_pin")),
-    ("jib", ("jib_pivot", "coupler_pin", "extension_start")),
-    ("extension", ("extension_start", "tip")),
+    ("pillar", "foot lift_pivot"),
+    ("cylinder", "lift_cylinder_base lift_cylinder_head"),
+    ("cylinder", "jib_cylinder_base rocker_head"),
+    ("lift arm", "lift_pivot jib_pivot"),
+    ("rocker, coupler", "rocker_pivot rocker_head coupler_pin"),
+    ("jib", "jib_pivot coupler_pin extension_start"),
+    ("extension", "extension_start tip"),
 )
 
 # Pins, the beam each one moves with, and where its letter stands (points, in the lift frame)
@@ -71,7 +65,7 @@ def links(geometry: CraneGeometry, strokes: Array) -> pd.DataFrame:
         {"crane": k, "link": link, "piece": f"{k} {piece}", "x": x, "y": y}
         for k in range(len(strokes))
         for piece, (link, corners) in enumerate(LINKS)
-        for x, y in (pins[corner][k] for corner in corners)
+        for x, y in (pins[corner][k] for corner in corners.split())
     ]
     return pd.DataFrame(rows)
 
@@ -87,7 +81,7 @@ def crane(geometry: CraneGeometry, shape: Mapping[str, Any]) -> Drawing:
         name: nodes + float(shape["exaggeration"]) * (np.asarray(shape["beams"][name]) - nodes)
         for name, nodes in reference.items()
     }
-    strokes = np.asarray(shape["strokes"], dtype=float)
+    strokes, rigid_tip = np.asarray(shape["strokes"], dtype=float), reference["extension"][-1]
     posed = pose(geometry, strokes[None])
     names = {letter: field for letter, (field, _, _) in PINS.items()} | {"H": "rocker_head"}
     rigid = {letter: np.asarray(getattr(posed, field)[0]) for letter, field in names.items()}
@@ -103,8 +97,8 @@ def crane(geometry: CraneGeometry, shape: Mapping[str, Any]) -> Drawing:
         *_ground(bent["pillar"][0]),
         *_beams(bent, pins),
         *_cylinders(geometry, pins),
-        *_ends(reference["extension"][-1], bent, pins),
-        _texts([("rigid tip", reference["extension"][-1], (9.0, 7.0), "left")], fontsize=9.5),
+        *_ends([rigid_tip, bent["extension"][-1]], bent, pins),
+        _texts([("rigid tip", rigid_tip, (9.0, 7.0), "left")]),
         *_labels(bent, pins, strokes, angle, float(shape["payload"])),
         x=Axis("x (m)", limits=(low[0], high[0])),
         y=Axis("y (m)", limits=(low[1], high[1])),
@@ -174,33 +168,28 @@ def _rigid(reference: Points, pins: Points) -> list[Layer]:
 
 def _ground(foot: Array) -> list[Layer]:
     """Ground at the flange, and the torsion spring that holds the pillar."""
-    turns = np.linspace(0.0, 5 * np.pi, 200)
-    radius = 0.012 + 0.013 * turns
-    spiral = foot + np.column_stack([radius * np.cos(turns), radius * np.sin(turns)])
-    left, right, low = foot[0] - 0.55, foot[0] + 0.55, foot[1] - 0.24
-    hatch = [[[x, low], [x - 0.1, low - 0.12]] for x in np.linspace(left + 0.1, right, 10)]
-    ink = {"color": style.INK, "zorder": 2}
-    return [
-        _layer(spiral, "-", color=style.PURPLE, linewidth=2, zorder=6),
-        _layer([[left, low], [right, low]], "-", linewidth=1.4, **ink),
-        *(_layer(line, "-", linewidth=0.8, **ink) for line in hatch),
-    ]
+    turns = np.linspace(0.0, 5 * np.pi, 200)[:, None]
+    spiral = foot + (0.012 + 0.013 * turns) * np.hstack([np.cos(turns), np.sin(turns)])
+    left, low = foot - [0.55, 0.24]
+    hatch = [[[x, low], [x - 0.1, low - 0.12]] for x in np.linspace(left + 0.1, left + 1.1, 10)]
+    lines = [[[left, low], [left + 1.1, low]], *hatch]
+    ground = [_layer(line, "-", linewidth=1.0, color=style.INK, zorder=2) for line in lines]
+    return [_layer(spiral, "-", color=style.PURPLE, linewidth=2, zorder=6), *ground]
 
 
 def _beams(bent: Points, pins: Points) -> list[Layer]:
     """Beams, and the rigid arms from their axes to pins beside them."""
     found = []
     for name in BEAMS:
-        layer = 2.8 if name == "extension" else 3.0
+        look, layer = {"color": COLOUR[name]}, 2.8 if name == "extension" else 3.0
         for letter, (_, beam, _) in PINS.items():
             if beam == name or (name == "jib" and letter == "G"):
                 arm = [_nearest(bent[name], pins[letter]), pins[letter]]
-                found.append(_layer(arm, "-", color=COLOUR[name], linewidth=9, zorder=layer - 0.1))
+                found.append(_layer(arm, "-", linewidth=9, zorder=layer - 0.1, **look))
         outline = _outline(bent[name], HALF_DEPTH[name])
-        found.append(_layer(outline, "area", color=COLOUR[name], zorder=layer))
-    hidden = [bent["extension"][0], bent["jib"][-1]]
-    white = {"color": "white", "linewidth": 1.0, "linestyle": (0, (5, 4)), "zorder": 3.1}
-    return [*found, _layer(hidden, "-", **white)]
+        found.append(_layer(outline, "area", zorder=layer, **look))
+    dashed = {"color": "white", "linewidth": 1.0, "linestyle": (0, (5, 4)), "zorder": 3.1}
+    return [*found, _layer([bent["extension"][0], bent["jib"][-1]], "-", **dashed)]
 
 
 def _nearest(axis: Array, pin: Array) -> Array:
@@ -210,71 +199,66 @@ def _nearest(axis: Array, pin: Array) -> Array:
 
 
 def _cylinders(geometry: CraneGeometry, pins: Points) -> list[Layer]:
+    """Cylinders, rocker and coupler."""
     found = []
-    for base, head, length in (
-        ("C", "D", geometry.lift_cylinder_length),
-        ("E", "H", geometry.jib_cylinder_length),
-    ):
+    lengths = geometry.lift_cylinder_length, geometry.jib_cylinder_length
+    for (base, head), length in zip((("C", "D"), ("E", "H")), lengths, strict=True):
         start, end = pins[base], pins[head]
         barrel = start + 0.9 * length * (end - start) / np.hypot(*(end - start))
-        found.append(_layer([start, end], "-", color="#A6A6A6", linewidth=4, zorder=4))
         dark = {"color": "#3D3D3D", "solid_capstyle": "butt"}
+        found.append(_layer([start, end], "-", color="#A6A6A6", linewidth=4, zorder=4))
         found.append(_layer([start, barrel], "-", linewidth=8, zorder=4.1, **dark))
     rods = [pins[letter] for letter in "FHI"]
     return [*found, _layer(rods, "-", color=style.GREEN, linewidth=6, zorder=4.2)]
 
 
-def _ends(rigid_tip: Array, bent: Points, pins: Points) -> list[Layer]:
-    """Pads where extension and jib touch, pins, both tips."""
-    pads = [bent["extension"][0], bent["jib"][-1]]
-    white = {"color": style.INK, "markerfacecolor": "white"}
+def _ends(tips: list[Array], bent: Points, pins: Points) -> list[Layer]:
+    """Pads where extension and jib touch, pins, the rigid and the loaded one of the `tips`."""
+    pads, ink = [bent["extension"][0], bent["jib"][-1]], {"color": style.INK, "zorder": 7}
+    white = ink | {"markerfacecolor": "white"}
     return [
-        _layer(pads, "s", color="white", markersize=7, zorder=5),
-        _layer(pads, "s", color=style.INK, markersize=4.5, zorder=5.1),
-        _layer(list(pins.values()), "o", markersize=6, zorder=6, **white),
-        _layer([rigid_tip, bent["extension"][-1]], "-", color=style.INK, linewidth=1.4, zorder=7),
-        _layer([rigid_tip], "o", markersize=8, zorder=7, **white),
-        _layer([bent["extension"][-1]], "o", markersize=8, zorder=7, color=style.INK),
+        _layer(pads, "s", markersize=5.5, markeredgecolor="white", **ink),
+        _layer(list(pins.values()), "o", markersize=6, **white),
+        _layer(tips, "-", linewidth=1.4, **ink),
+        _layer(tips[:1], "o", markersize=8, **white),
+        _layer(tips[1:], "o", markersize=8, **ink),
     ]
 
 
 def _labels(
     bent: Points, pins: Points, strokes: Array, angle: float, payload: float
 ) -> list[Layer]:
-    lift, jib, extension = (f"{MM * s:.0f} mm" for s in strokes)
-    middle = {name: bent[name][[0, -1]].mean(axis=0) for name in BEAMS}
-    outer = (bent["jib"][-1] + bent["extension"][-1]) / 2
-    inner = (bent["extension"][0] + bent["jib"][-1]) / 2
-    tip, boxed = bent["extension"][-1], {"facecolor": style.PALE, "edgecolor": style.INK}
+    lift, jib, extension = (f"stroke {MM * s:.0f} mm" for s in strokes)
+    ends = {name: (bent[name][0], bent[name][-1]) for name in BEAMS}
+    pads = ends["extension"][0], ends["jib"][1]
+    tip, boxed = ends["extension"][1], {"facecolor": style.PALE, "edgecolor": style.INK}
+    over = tuple(_turned(angle, (-24.0, 44.0)))
+
+    def middle(a: Array, b: Array, share: float = 0.5) -> Array:
+        return (1 - share) * a + share * b
+
     named = [
-        ("pillar", middle["pillar"], (-40.0, 0.0), "right"),
-        ("ground spring", bent["pillar"][0], (50.0, 0.0), "left"),
-        ("lift arm", 0.4 * pins["B"] + 0.6 * pins["G"], (12.0, -30.0), "left"),
-        (f"lift cylinder\nstroke {lift}", (pins["C"] + pins["D"]) / 2, (28.0, -8.0), "left"),
-        (
-            f"jib cylinder\nstroke {jib}",
-            0.6 * pins["E"] + 0.4 * pins["H"],
-            _turned(angle, (-24.0, 44.0)),
-            "right",
-        ),
-        ("rocker", (pins["F"] + pins["H"]) / 2, (-40.0, 45.0), "right"),
-        ("coupler", (pins["H"] + pins["I"]) / 2, (34.0, 34.0), "left"),
-        ("jib", inner, (-28.0, -34.0), "right"),
-        ("rear pad", bent["extension"][0], (4.0, 46.0), "center"),
-        ("front pad", bent["jib"][-1], (20.0, 34.0), "left"),
-        (f"extension\nstroke {extension}", outer, (-20.0, -44.0), "right"),
+        ("pillar", middle(*ends["pillar"]), (-40.0, 0.0), "right"),
+        ("ground spring", ends["pillar"][0], (50.0, 0.0), "left"),
+        ("lift arm", middle(pins["B"], pins["G"], 0.6), (12.0, -30.0), "left"),
+        (f"lift cylinder\n{lift}", middle(pins["C"], pins["D"]), (28.0, -8.0), "left"),
+        (f"jib cylinder\n{jib}", middle(pins["E"], pins["H"], 0.4), over, "right"),
+        ("rocker", middle(pins["F"], pins["H"]), (-40.0, 45.0), "right"),
+        ("coupler", middle(pins["H"], pins["I"]), (34.0, 34.0), "left"),
+        ("jib", middle(*pads), (-28.0, -34.0), "right"),
+        ("rear pad", pads[0], (4.0, 46.0), "center"),
+        ("front pad", pads[1], (20.0, 34.0), "left"),
+        (f"extension\n{extension}", middle(pads[1], tip), (-20.0, -44.0), "right"),
     ]
     letters = {letter: offset for letter, (_, _, offset) in PINS.items()} | dict([HEAD])
     pin_names = [
         (letter, pins[letter], offset if letter in "BC" else _turned(angle, offset), "center")
         for letter, offset in letters.items()
     ]
-    tips = [("loaded tip", tip, (11.0, 2.0), "left")]
     weight = [(f"{payload:g} kg", tip, (0.0, -32.0), "center")]
     return [
-        _texts(named, fontsize=9.5, leader=True),
-        _texts(pin_names, fontsize=10.5),
-        _texts(tips, fontsize=9.5),
+        _texts(named, leader=True),
+        _texts([*pin_names, ("loaded tip", tip, (11.0, 2.0), "left")]),
         _texts(weight, leader=True, bbox={"boxstyle": "square,pad=0.4", **boxed}, path_effects=[]),
     ]
 
@@ -282,4 +266,4 @@ def _labels(
 def _texts(rows: list[tuple[str, Array, Any, str]], **look: Any) -> Layer:
     columns = [(text, *point, *offset, side) for text, point, offset, side in rows]
     frame = pd.DataFrame(columns, columns=["text", "x", "y", "dx", "dy", "side"])
-    return Layer(frame, "x", "y", "text", text="text", look=look)
+    return Layer(frame, "x", "y", "text", text="text", look={"fontsize": 9.5, **look})

@@ -29,6 +29,7 @@ from flexik.learning.size_selection import by_size, read_layers
 from flexik.learning.storage import load_network
 from flexik.positioning.inverted_network import InvertedSettings
 from flexik.positioning.method import Settings
+from flexik.reporting.report import digest
 from flexik.reporting.style import MM
 
 Array = NDArray[np.float64]
@@ -42,6 +43,7 @@ KIND = {
     "coordinates": "inverse",
 }
 SELECTED = "_selected"
+TIMES = ("microseconds_single", "microseconds_batched")
 
 
 @dataclass(frozen=True)
@@ -186,8 +188,7 @@ class Results:
             theirs.get(k) if k == self.methods[k].method else None for k in frame["method"]
         ]
         times = self.query_times.set_index("method").reindex(frame["method"])
-        frame["single (us)"] = times["microseconds_single"].to_numpy()
-        frame["batched (us)"] = times["microseconds_batched"].to_numpy()
+        frame[["single (us)", "batched (us)"]] = times[list(TIMES)].to_numpy()
         frame["mean R (mm)"] = [MM * self.statistics[k]["mean_error"] for k in frame["method"]]
         return frame.astype({"operations": float, "published": float})
 
@@ -208,8 +209,11 @@ def read(section: Section, data: Path) -> Results:
         label: data / "errors" / "published" / f"{label}.spread.parquet"
         for label in section.methods
     }
+    times = read_csv(
+        BENCHMARKS / "positioning.csv", TIMES, ("method", "settings"), ("method",)
+    ).query("method in @section.methods")
+    keys = [query_key(section, name) for name in times["method"]]
     studies, sizes = data / "studies", data / "sizes"
-    times = ("microseconds_single", "microseconds_batched")
     return Results(
         section=section,
         spring_stiffness=read_json(data / "constants" / "spring.json")["spring_stiffness"],
@@ -234,12 +238,20 @@ def read(section: Section, data: Path) -> Results:
         },
         tolerances=read_table(studies / "tolerance.parquet"),
         fitting=read_table(studies / "fitting.parquet"),
-        query_times=read_csv(BENCHMARKS / "positioning.csv", times, ("method",), ("method",)),
+        query_times=times[times["settings"] == keys],
         training_curves=read_csv(
             BENCHMARKS / "training_methods.csv", ("seconds", "error"), ("trainer",)
         ),
         shape=read_json(studies / "shape.json"),
     )
+
+
+def query_key(section: Section, name: str) -> str:
+    """Checksum of what the time of a query of method `name` depends on."""
+    method = section.methods[name]
+    network = section.networks[method.network].model_dump() if method.network else None
+    given = method.model_dump(exclude={"n_targets"})
+    return digest([section.machine.geometry.model_dump(), given, network])
 
 
 def published() -> dict[str, pd.DataFrame]:
