@@ -178,6 +178,7 @@ STUDIES = ("studies", "starts")
         (("conditions", "corners", "kind"), "path", "Field required"),
         (("conditions", "outside", "extent"), 1.0, "greater than 1"),
         (("conditions", "path_100", "cycles"), [1, 2, 3], "at least 6 items"),
+        (("conditions", "restarts"), {"kind": "corners"}, "the name is taken"),
         (("methods", "network", "start"), "nobody", "there is no networks 'nobody'"),
         (("methods", "centre", "conditions"), ["nowhere"], r"centre\.conditions\.0: there is no"),
         (("methods", "best", "n_steps"), [101], "less than or equal to 100"),

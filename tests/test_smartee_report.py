@@ -10,14 +10,12 @@ from test_smartee_poses import draw, rows
 
 from flexik.cases.smartee import report_starts, report_tables
 from flexik.cases.smartee.parts.errors import COLUMNS, conditions_of, judge_of
-from flexik.cases.smartee.parts.geometries import conditions
 from flexik.cases.smartee.parts.methods import DirectKinematics
 from flexik.cases.smartee.parts.poses import POSE_FIELDS, extent_of, geometry_of, values
 from flexik.cases.smartee.report import TEMPLATE, content
 from flexik.cases.smartee.report_results import Results, current, published_peaks, scientific
 from flexik.errors import DataError
 from flexik.evaluation.errors import evaluate
-from flexik.kinematics.smartee import closure_jacobian, elbow_circles, leg_tip_velocities, leg_tips
 from flexik.reporting.page import render
 
 PAIR = ["regularised_cg", "unpenalised_cg"]
@@ -214,15 +212,6 @@ def test_ways_to_the_elbows_have_errors_and_times(results):
         *("< 1e-12", "")
     ]
     assert ("centre", "0") not in known.index
-
-
-def test_condition_numbers_are_those_of_the_jacobian():
-    _, joints = draw(SMARTEE, "random")
-    circles = elbow_circles(GEOMETRY, joints[..., :2])
-    tips = leg_tips(circles, joints[..., 2])
-    jacobian = closure_jacobian(tips, leg_tip_velocities(circles, joints[..., 2]))
-    expected = [np.linalg.cond(one) for one in jacobian]
-    np.testing.assert_allclose(conditions(GEOMETRY, joints), expected, rtol=1e-9)
 
 
 def test_errors_outside_are_sorted_by_extent(results):

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from flexik.cases.smartee.parts.evaluate import RESTARTS
-from flexik.cases.smartee.section import BEST, PUBLISHED, Section
+from flexik.cases.smartee.section import BEST, PUBLISHED, RESTARTS, Section
 from flexik.datasets.tables import read_csv, read_table
 from flexik.errors import DataError
 from flexik.files import read_json

@@ -22,6 +22,8 @@ SELECTION = "selection"
 VALIDATION, RANDOM, OUTSIDE, CORNERS = CONDITIONS = ("validation", "random", "outside", "corners")
 # The network whose errors stand beside the published ones, and the best one: networks and methods
 PUBLISHED, BEST = "network", "best"
+# Where errors of all restarts stand among those of conditions
+RESTARTS = "restarts"
 # Starts of Newton's method that are no network, and methods; and the method that converges
 CENTRE, PREVIOUS, NEWTON = "centre", "previous", "newton"
 
@@ -218,6 +220,8 @@ class Section(Model):
                 raise ValueError(f"{key}: there is no {where} {name!r} ({', '.join(known)})")
             if where == "samples.poses" and name == SELECTION:
                 raise ValueError(f"{key}: {name} is kept from training")
+        if RESTARTS in self.conditions:
+            raise ValueError(f"conditions.{RESTARTS}: the name is taken")
         for name in CONDITIONS:
             expected = RANDOM if name == VALIDATION else name
             if self.conditions[name].kind != expected:

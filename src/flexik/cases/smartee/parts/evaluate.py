@@ -18,7 +18,16 @@ from flexik.cases.smartee.parts.poses import (
     geometry_of,
     values,
 )
-from flexik.cases.smartee.section import CORNERS, RANDOM, VALIDATION, Box, Machine, Method, Section
+from flexik.cases.smartee.section import (
+    CORNERS,
+    RANDOM,
+    RESTARTS,
+    VALIDATION,
+    Box,
+    Machine,
+    Method,
+    Section,
+)
 from flexik.datasets.parts import Part, Work, Writer, table, whole
 from flexik.datasets.tables import Field, read_table
 from flexik.evaluation.errors import evaluate, fields_of
@@ -27,7 +36,6 @@ from flexik.learning.storage import load_network, load_restarts
 N_STEPS = Field("n_steps", "1", "Newton steps at most", "int64")
 EXTENT = Field("extent", "1", "largest coordinate of the pose, in half extents of the box")
 # Largest errors of the network of every restart
-RESTARTS = "restarts"
 RESTART_FIELDS = (
     Field("restart", "1", "number of the start, from 0", "int64"),
     Field("conditions", "1", "name of the set of poses", "string"),
