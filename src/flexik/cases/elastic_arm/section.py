@@ -223,6 +223,7 @@ class Studies(Model):
 class Section(Model):
     """The elastic two-link arm."""
 
+    calibration: None = None
     machine: Machine
     trainers: dict[Name, Trainer]
     samples: Samples

@@ -149,6 +149,7 @@ class Success(Model):
 class Section(Model):
     """The six-joint arm."""
 
+    calibration: None = None
     machine: Machine
     trainers: dict[Name, Trainer]
     samples: Samples

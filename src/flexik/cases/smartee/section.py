@@ -189,6 +189,7 @@ class Studies(Model):
 class Section(Model):
     """The parallel manipulator."""
 
+    calibration: None = None
     machine: Machine
     trainers: dict[Name, Trainer]
     samples: Samples
