@@ -40,7 +40,11 @@ def report(section: Section) -> None:
         content(results) | measured(section),
         sources=made_from(
             section,
-            [MACHINE, *section.machine.structure.beams.sections.values(), *REFERENCE.glob("*.csv")],
+            [
+                MACHINE,
+                *section.machine.structure.beams.sections.values(),
+                *sorted(REFERENCE.glob("*.csv")),
+            ],
         ),
         record=DATA / "report.json",
     )
