@@ -10,23 +10,23 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from training_data import (
-    ACTIVATION,
     OURS,
     SEED,
     Array,
-    crane_data,
-    quantities,
+    crane_lesson,
+    endless,
     run_ours,
     teacher_sample,
 )
 
 from flexik.datasets.parallel import ParallelSettings
-from flexik.learning.size_selection import Study, run_study
-from flexik.learning.training import Architecture, trainer_settings
+from flexik.datasets.parts import Part, Work, make
+from flexik.learning.size_selection import select
 
 SAMPLES = (4_000, 40_000, 400_000)
 SIZES = (14, 30, 60)
@@ -80,8 +80,8 @@ def measure_steps(n_repeats: int, samples: tuple[int, ...]) -> dict[str, float]:
         for n, h in cells:
             # short runs vary more, so there are more of them
             n_runs = max(1, min(5, 20_000 // n))
-            options: dict[str, float] = {"n_iterations": N_ITERATIONS, "minimum_gradient": 0.0}
-            runs = [run_ours(inputs[:n], outputs[:n], h, OURS, 0, options) for _ in range(n_runs)]
+            settings = endless(OURS, n_iterations=N_ITERATIONS)
+            runs = [run_ours(inputs[:n], outputs[:n], h, settings) for _ in range(n_runs)]
             seconds = float(np.median([used / (len(errors) - 1) for _, errors, used in runs]))
             floor = step_flops(n, inputs.shape[1], h, outputs.shape[1]) / rate
             per_sample[n, h] = seconds / n
@@ -109,26 +109,17 @@ def measure_memory(n_samples: int) -> dict[str, float]:
 
 def measure_study(sizes: tuple[int, ...], n_restarts: int, n_processes: int) -> dict[str, float]:
     """Seconds of a study of the deflection network, with its table and the start of processes."""
-    data = crane_data("deflection")
-    options = {"n_iterations": STUDY_ITERATIONS, "minimum_progress": 0.0}
-    study = Study(
-        data.inputs,
-        data.outputs,
-        data.selection_inputs,
-        data.selection_outputs,
-        Architecture(sizes[0], ACTIVATION),
-        trainer_settings(OURS, options),
-        SEED,
-        quantities(data.inputs.shape[1]),
-        quantities(data.outputs.shape[1]),
-    )
+    settings = {"sizes": [(size,) for size in sizes], "n_restarts": n_restarts}
     started = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "study.parquet"
-        settings = ParallelSettings(n_processes)
-        run_study(path, study, sizes, n_restarts, "benchmark", "benchmark", settings, "study")
+        make(folder, [Part("study", _study, settings)], ParallelSettings(n_processes))
     seconds = time.perf_counter() - started
     return {"study_seconds": seconds, "study_networks": len(sizes) * n_restarts}
+
+
+def _study(*, sizes: list[tuple[int, ...]], n_restarts: int) -> Work:
+    settings = endless(OURS, n_iterations=STUDY_ITERATIONS)
+    return select(replace(crane_lesson("deflection"), settings=settings), sizes, n_restarts, None)
 
 
 def _status(name: str) -> float:
@@ -142,9 +133,9 @@ def _train_and_report(path: Path, n_hidden: int) -> dict[str, float]:
     inputs, outputs = columns[:, :-2].copy(), columns[:, -2:].copy()
     del columns
     # loads what loads late, and its few samples leave the peak alone
-    run_ours(inputs[:1000], outputs[:1000], n_hidden, OURS, 0, {"n_iterations": 2})
+    run_ours(inputs[:1000], outputs[:1000], n_hidden, OURS(n_iterations=2))
     before = _status("VmRSS")
-    run_ours(inputs, outputs, n_hidden, OURS, 0, {"n_iterations": 3})
+    run_ours(inputs, outputs, n_hidden, OURS(n_iterations=3))
     data = (inputs.nbytes + outputs.nbytes) / MEGABYTE
     # the peak is that of the process since its start: never less than what training took
     return {"above_data_mb": _status("VmHWM") - before, "data_mb": data}

@@ -5,89 +5,62 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.datasets.crane.grid import FIELDS, INPUTS, deflection, kept
-from flexik.datasets.crane.provenance import grid_checksum, selection_checksum
-from flexik.datasets.tables import read_table
-from flexik.files import read_json
+from flexik.cases.case import load
+from flexik.cases.crane.parts.learning import lesson
+from flexik.cases.crane.parts.train import data_inputs
+from flexik.kinematics.crane_manipulator import geometry_of
 from flexik.learning.perceptron import Network, Normalisation, Quantity
 from flexik.learning.problem import Problem, problem
-from flexik.learning.training import Architecture, train, trainer_settings
+from flexik.learning.training import Architecture, Lesson, train
 from flexik.learning.weights import Weights, initial_weights
-from flexik.parameters import load_parameters
+from flexik.parameters.trainers import LevenbergMarquardt, LevenbergMarquardtAccelerated, Stopping
 
 Array = NDArray[np.float64]
 
 ACTIVATION = "tanh"
 SEED = 1
-OURS = "levenberg_marquardt_accelerated"
-PUBLISHED = "levenberg_marquardt"
-NETWORKS = ("deflection", "direct")
-DATA = Path("data/crane")
+OURS, PUBLISHED = LevenbergMarquardtAccelerated, LevenbergMarquardt
+# what each network learns
+NETWORKS = {"deflection": "deflection", "direct": "tip"}
 
 # The teacher of large samples, and the noise that keeps any student from fitting it exactly
 TEACHER_HIDDEN, TEACHER_ITERATIONS, TEACHER_NOISE = 60, 40, 1e-4
 
 
-@dataclass(frozen=True, eq=False)
-class Data:
-    """Inputs (n, 4) and outputs (n, 2), and selection data of the same form."""
-
-    inputs: Array
-    outputs: Array
-    selection_inputs: Array
-    selection_outputs: Array
-
-
 @functools.cache
-def crane_data(network: str) -> Data:
-    """Grid and selection data of one of NETWORKS, in SI units: deflection, or the tip itself.
+def crane_lesson(network: str) -> Lesson:
+    """Grid and selection data of one of NETWORKS, in SI units.
 
-    Raises DataError when the pipeline has not made them with these parameters.
+    Raises DataError when the pipeline has not made them.
     """
-    crane = load_parameters().crane
-    stiffness = read_json(DATA / "calibration.json")["spring_stiffness"]
-    columns = []
-    for name, made_with in (("grid", grid_checksum), ("selection", selection_checksum)):
-        path = DATA / f"{name}.parquet"
-        table = kept(read_table(path, FIELDS, made_with(crane, stiffness)))
-        tip = table[["tip_x", "tip_y"]].to_numpy()
-        columns += [
-            table[list(INPUTS)].to_numpy(),
-            deflection(table) if network == "deflection" else tip,
-        ]
-    return Data(*columns)
+    geometry = geometry_of(load("crane").machine)
+    architecture = Architecture(1, ACTIVATION)
+    return lesson(NETWORKS[network], architecture, OURS(), SEED, geometry, **data_inputs())
 
 
-def quantities(n: int) -> list[Quantity]:
+def columns(n: int) -> list[Quantity]:
     """Names for `n` columns; the trainers do not look at them."""
     return [Quantity(f"column {k}", "1") for k in range(n)]
 
 
 def run_ours(
-    inputs: Array,
-    outputs: Array,
-    n_hidden: int,
-    trainer: str,
-    restart: int,
-    options: dict[str, float],
+    inputs: Array, outputs: Array, n_hidden: int, settings: Stopping, restart: int = 0
 ) -> tuple[Network, tuple[float, ...], float]:
     """Train through the package's door: network, mean squared errors, seconds."""
-    network, record = train(
-        inputs,
-        outputs,
-        Architecture(n_hidden, ACTIVATION),
-        trainer_settings(trainer, {"minimum_progress": 0.0} | options),
-        SEED,
-        quantities(inputs.shape[1]),
-        quantities(outputs.shape[1]),
-        restart=restart,
-    )
-    return network, record.errors, record.seconds
+    started = time.perf_counter()
+    names = columns(inputs.shape[1]), columns(outputs.shape[1])
+    architecture = Architecture(n_hidden, ACTIVATION)
+    network, record = train(Lesson(inputs, outputs, *names, architecture, settings, SEED), restart)
+    return network, record.errors, time.perf_counter() - started
+
+
+def endless(trainer: type[Stopping], **options: float) -> Stopping:
+    """Settings that end by `options` alone."""
+    return trainer(minimum_progress=0.0, minimum_gradient=0.0).but(**options)
 
 
 def teacher_sample(n_samples: int) -> tuple[Array, Array]:
@@ -95,9 +68,9 @@ def teacher_sample(n_samples: int) -> tuple[Array, Array]:
 
     No equilibrium is solved: cost does not depend on what is fitted.
     """
-    data = crane_data("deflection")
-    options: dict[str, float] = {"n_iterations": TEACHER_ITERATIONS}
-    network, _, _ = run_ours(data.inputs, data.outputs, TEACHER_HIDDEN, OURS, 0, options)
+    data = crane_lesson("deflection")
+    settings = endless(OURS, n_iterations=TEACHER_ITERATIONS)
+    network, _, _ = run_ours(data.inputs, data.outputs, TEACHER_HIDDEN, settings)
     rng = np.random.default_rng(SEED)
     inputs = rng.uniform(-1.0, 1.0, (n_samples, data.inputs.shape[1]))
     outputs = np.empty((n_samples, data.outputs.shape[1]))
@@ -135,7 +108,7 @@ class Case:
 
 def case(network: str, n_hidden: int, restart: int) -> Case:
     """The start that `run_ours` draws for `restart`, and the data as it normalises them."""
-    data = crane_data(network)
+    data = crane_lesson(network)
     pair = (data.inputs, data.outputs)
     inputs, targets = (Normalisation.from_data(values).to_unit(values) for values in pair)
     generator = np.random.default_rng((SEED, restart))

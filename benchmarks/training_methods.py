@@ -25,7 +25,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
-from training_data import ACTIVATION, SEED, case, crane_data
+from training_data import ACTIVATION, SEED, case, crane_lesson
 from training_race import pinned_pool
 
 from flexik import stage
@@ -33,9 +33,14 @@ from flexik.errors import DataError
 from flexik.files import write_text
 from flexik.learning.problem import problem
 from flexik.learning.stopping import Monitor, StopReason
-from flexik.learning.training import TRAINERS, trainer_settings
+from flexik.learning.training import TRAINERS
 from flexik.learning.weights import Weights
-from flexik.parameters import load_parameters
+from flexik.parameters.trainers import (
+    BackPropagation,
+    LevenbergMarquardt,
+    LevenbergMarquardtAccelerated,
+    Stopping,
+)
 from flexik.reporting.tables import markdown
 
 Array = NDArray[np.float64]
@@ -55,12 +60,14 @@ RATES = {
 }
 TIMES = (1.0, 10.0, 60.0)  # s, columns of the table
 
-ENDLESS = {"n_iterations": 10**9, "minimum_progress": 0.0, "minimum_gradient": 0.0}
-# by label: name under crane.trainers, and what differs from it
-METHODS: dict[str, tuple[str, dict[str, Any]]] = {
-    "Levenberg-Marquardt": ("levenberg_marquardt", {}),
-    "Levenberg-Marquardt, accelerated": ("accelerated", {}),
-} | {label: ("back_propagation", ENDLESS | {"mode": label.partition(", ")[2]}) for label in RATES}
+# the published schedule and the accelerated one end by their own rules, back-propagation by time
+LONG = BackPropagation(n_iterations=10**9, minimum_gradient=0.0)
+METHODS: dict[str, Stopping] = {
+    "Levenberg-Marquardt": LevenbergMarquardt(minimum_progress=1e-4),
+    "Levenberg-Marquardt, accelerated": LevenbergMarquardtAccelerated(),
+    "back-propagation, batch": LONG,
+    "back-propagation, pattern": LONG.but(mode="pattern"),
+}
 DECIMALS = {"ended after (s)": 2, "to best back-propagation (s)": 3}
 DECIMALS |= {f"after {seconds:g} s": 4 for seconds in TIMES}
 
@@ -111,10 +118,8 @@ def run(label: str, start: int, options: dict[str, Any]) -> Curve:
 
 
 def _timed(label: str, start: int, options: dict[str, Any]) -> Curve:
-    name, changes = METHODS[label]
-    settings = load_parameters().crane.trainers[name].model_dump() | changes | options
-    kind = settings.pop("kind")
-    trainer, ends = TRAINERS[kind], list[float]()
+    settings = METHODS[label].but(**options)
+    minimise, ends = TRAINERS[settings.kind], list[float]()
 
     class Timed(Monitor):
         """Notes when each iteration ends, for the record has the time of the whole run only."""
@@ -127,8 +132,8 @@ def _timed(label: str, start: int, options: dict[str, Any]) -> Curve:
     # one of its own, for a problem remembers the last pass
     own = problem(ACTIVATION, given.inputs, given.targets)
     generator = np.random.default_rng((SEED, start))
-    with patch.object(sys.modules[trainer.minimise.__module__], "Monitor", Timed):
-        found = trainer.minimise(given.start, own, trainer_settings(kind, settings), generator)
+    with patch.object(sys.modules[minimise.__module__], "Monitor", Timed):
+        found = minimise(given.start, own, settings, generator)
     errors = np.minimum.accumulate(np.sqrt(found.errors))
     # an error that is not finite is noted and not kept
     seconds = np.array(ends[: len(errors)]) - ends[0]
@@ -186,8 +191,8 @@ def notes(curves: Sequence[Curve], rates: dict[str, float], load: tuple[float, f
     return [
         "Errors: root mean square of the normalised outputs over the training data, the least so "
         "far, which is that of the network a run keeps; after a run has ended, its last.",
-        "Settings of params.yaml, crane.trainers; Levenberg-Marquardt ends by its own rules "
-        f"there, back-propagation after {LIMIT:g} s alone. All begin with the same weights.",
+        "Default settings; Levenberg-Marquardt ends by its own rules, back-propagation after "
+        f"{LIMIT:g} s alone. All begin with the same weights.",
         f"Learning rates, the best from start {RATES_START} after {RATES_LIMIT:g} s: {tried}. Both "
         "modes have momentum and the variable rate (up after a better pass, down and the pass "
         "undone after one that is much worse); in pattern mode this goes beyond equations 51 to "
@@ -211,7 +216,7 @@ def main() -> None:
     # before the processes import NumPy
     os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     try:
-        crane_data(NETWORK)
+        crane_lesson(NETWORK)
     except DataError as error:
         raise DataError(f"run `make repro` first: {error}") from error
     started, load = time.perf_counter(), os.getloadavg()[0]

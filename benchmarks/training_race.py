@@ -12,11 +12,13 @@ from importlib.metadata import PackageNotFoundError, version
 from multiprocessing import get_context
 from typing import Any
 
+import training_data
 from threadpoolctl import threadpool_limits
-from training_data import OURS, PUBLISHED, Case, Finished, Watch, case, crane_data, run_ours
+from training_data import Case, Finished, Watch, case, crane_lesson, endless, run_ours
 from training_peers import PEERS, silent
 
 from flexik.errors import FlexikError
+from flexik.parameters.trainers import Stopping
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,8 @@ QUICK_RACES = (
     Race("direct", 30, 1.2e-2, 5.4e-3, 100, 8.0, 1),
 )
 
+OURS, PUBLISHED = "ours", "published"
+TRAINERS: dict[str, type[Stopping]] = {OURS: training_data.OURS, PUBLISHED: training_data.PUBLISHED}
 # iterations this package gets; its goals stop it before
 AT_MOST = {OURS: 500, PUBLISHED: 600}
 LABELS = {OURS: "flexik, accelerated", PUBLISHED: "flexik, published schedule"} | {
@@ -95,7 +99,7 @@ def run_race(race: Race) -> dict[str, Runs]:
     """
     runs = {name: Runs() for name in LABELS}
     with threadpool_limits(1), silent():
-        run_ours(*_data(race), race.n_hidden, OURS, 0, {"n_iterations": 2})  # loads what loads late
+        _own(race, OURS, 0)  # loads what loads late
         for start in range(race.n_starts):
             own: list[tuple[float, float, float]] = []
             for name, peer in PEERS.items():
@@ -114,17 +118,13 @@ def run_race(race: Race) -> dict[str, Runs]:
     return runs
 
 
-def _data(race: Race) -> tuple[Any, Any]:
-    data = crane_data(race.network)
-    return data.inputs, data.outputs
-
-
 def _own(race: Race, trainer: str, start: int) -> tuple[float, float, float]:
     """Seconds to both targets, a run each, and the error of the longer."""
-    seconds, error = [], math.inf
+    seconds, error, data = [], math.inf, crane_lesson(race.network)
     for target in (race.loose, race.tight):
-        options = {"n_iterations": AT_MOST[trainer], "goal": target**2, "minimum_gradient": 0.0}
-        _, errors, used = run_ours(*_data(race), race.n_hidden, trainer, start, options)
+        limits = {"n_iterations": AT_MOST[trainer], "goal": target**2}
+        settings = endless(TRAINERS[trainer], **limits)
+        _, errors, used = run_ours(data.inputs, data.outputs, race.n_hidden, settings, start)
         error = math.sqrt(min(errors))
         seconds.append(used if error <= target else math.inf)
     return seconds[0], seconds[1], error

@@ -14,17 +14,19 @@ from flexik import kernels
 {fix}
 import hashlib
 import numpy as np
+from pydantic import TypeAdapter
 from flexik.learning.perceptron import Quantity
-from flexik.learning.training import TRAINERS, Architecture, train, trainer_settings
+from flexik.learning.training import TRAINERS, Architecture, Lesson, train
+from flexik.parameters.trainers import Trainer
 
 inputs = np.random.default_rng(1).uniform(-1.0, 1.0, (1500, 4))
 outputs = inputs @ np.arange(8.0).reshape(4, 2) / 8.0
 outputs = np.exp(outputs / (1.0 + outputs**2))
-quantities = [[Quantity(name, "m") for name in names] for names in ("abcd", "ef")]
+names = [[Quantity(name, "m") for name in names] for names in ("abcd", "ef")]
 found = hashlib.sha256()
 for kind in TRAINERS:
-    settings = trainer_settings(kind, {{"n_iterations": 10}})
-    network, _ = train(inputs, outputs, Architecture((9, 6)), settings, 1, *quantities)
+    settings = TypeAdapter(Trainer).validate_python({{"kind": kind, "n_iterations": 10}})
+    network, _ = train(Lesson(inputs, outputs, *names, Architecture((9, 6)), settings))
     for matrix in network.weights:
         found.update(np.ascontiguousarray(matrix).tobytes())
 print(kernels.differences())

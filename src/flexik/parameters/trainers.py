@@ -24,6 +24,7 @@ class Stopping(Model):
         network of the least selection error is kept, however the run ends
     """
 
+    kind: str = ""
     n_iterations: Count = 1000
     goal: NotNegative = 0.0
     minimum_gradient: NotNegative = 1e-10
