@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pandas as pd
 
+from flexik.cases.crane.parts.conditions import at_points
 from flexik.cases.crane.parts.fields import columns_of
 from flexik.cases.crane.section import Calibration, Section
 from flexik.datasets.parts import Part, Work, Writer, json_file, whole
 from flexik.datasets.tables import read_csv
 from flexik.errors import DataError
 from flexik.evaluation.calibration import fit_spring
-from flexik.evaluation.conditions import Conditions, every
 from flexik.evaluation.errors import evaluate, statistics, tip_judge
 from flexik.kinematics.crane_manipulator import CraneManipulator, geometry_of
 from flexik.machines.crane import Machine
@@ -47,8 +47,7 @@ def _spring(machine: Machine, calibration: Calibration, published: Path) -> dict
     if "mean_error" not in table:
         raise DataError(f"{published}: expected a row mean_error")
     manipulator, columns = CraneManipulator(geometry_of(machine)), columns_of(machine)
-    query, group = every(calibration.conditions.points, calibration.conditions.payloads)
-    conditions = Conditions(query, manipulator.initial_positions(query[:, :2]), group)
+    conditions = at_points(calibration.conditions, manipulator)
     method = Uncompensated(manipulator)
 
     def uncompensated(stiffness: float) -> pd.DataFrame:

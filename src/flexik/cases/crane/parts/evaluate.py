@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from flexik.cases.crane.parts.conditions import at, at_points
 from flexik.cases.crane.parts.crane import flexible, model_inputs, sorted_tips
 from flexik.cases.crane.parts.fields import TARGET_FIELDS, columns_of
 from flexik.cases.crane.parts.methods import (
@@ -25,7 +26,7 @@ from flexik.cases.crane.parts.methods import (
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part, Work, Writer, stacked, table
 from flexik.datasets.tables import Field, read_table
-from flexik.evaluation.conditions import Conditions, every
+from flexik.evaluation.conditions import Conditions
 from flexik.evaluation.errors import Judge, evaluate, fields_of, statistics, tip_judge
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.learning.storage import load_networks
@@ -93,13 +94,12 @@ def prepare(
     crane = flexible(machine, spring)
     manipulator = CraneManipulator(crane.geometry)
     if points is not None:
-        query, group = every(points.points, points.payloads)
+        conditions = at_points(points, manipulator)
     else:
         assert targets is not None
         frame = read_table(targets, TARGET_FIELDS)[:n_targets]
         query = frame[[field.name for field in TARGET_FIELDS[:3]]].to_numpy()
-        group = np.arange(len(query))
-    conditions = Conditions(query, manipulator.initial_positions(query[:, :2]), group)
+        conditions = at(query, np.arange(len(query)), manipulator)
     with_network = functools.partial(trained_method, method, build, manipulator, samples=samples)
     asked = with_network(network)
     items: list[Any] = [(asked, piece) for piece in conditions.chunks(ROWS)]

@@ -7,12 +7,13 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from flexik.cases.crane.parts.conditions import at_points
 from flexik.cases.crane.parts.crane import flexible, model_inputs, sorted_tips
 from flexik.cases.crane.parts.fields import columns_of
 from flexik.cases.crane.parts.methods import method_inputs, method_settings, trained_method
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part, Work, rows
-from flexik.evaluation.conditions import Conditions, every
+from flexik.evaluation.conditions import Conditions
 from flexik.evaluation.errors import Judge, evaluate, tip_judge
 from flexik.evaluation.tolerance import FIELDS, tolerance_row
 from flexik.kinematics.crane_manipulator import CraneManipulator
@@ -47,8 +48,7 @@ def prepare(
     """Ask every method with every tolerance."""
     crane = flexible(machine, spring)
     manipulator = CraneManipulator(crane.geometry)
-    query, group = every(points.points, points.payloads)
-    conditions = Conditions(query, manipulator.initial_positions(query[:, :2]), group)
+    conditions = at_points(points, manipulator)
     items = []
     for name, given in methods.items():
         for tolerance in tolerances:
