@@ -7,6 +7,7 @@ Only the commanding is timed: targets, payloads and current strokes in, strokes 
 Needs `make repro` for data/crane. Writes reports/benchmarks/positioning.csv and .md.
 """
 
+# ruff: noqa: E402
 import math
 import os
 import statistics
@@ -16,27 +17,27 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
+from flexik import kernels
+
+kernels.fix()  # before NumPy is imported
+
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 from training_race import pinned_pool
 
 from flexik import stage
-from flexik.datasets.crane.evaluations import TARGET_FIELDS
-from flexik.datasets.crane.provenance import query_checksum, targets_checksum
+from flexik.cases.case import load
+from flexik.cases.crane.parts.conditions import at, at_points
+from flexik.cases.crane.parts.fields import TARGET_FIELDS
+from flexik.cases.crane.parts.methods import SAMPLES, method_of
+from flexik.cases.crane.report_results import query_key
 from flexik.datasets.tables import read_table
 from flexik.errors import DataError
-from flexik.evaluation.conditions import Conditions, all_conditions, random_conditions
-from flexik.kinematics.crane import CraneGeometry
-from flexik.multibody.crane.assembly import read_spring_stiffness
-from flexik.parameters import load_parameters
-from flexik.positioning.crane.initial import initial_positions
-from flexik.positioning.crane.trained import trained_method
+from flexik.evaluation.conditions import Conditions
+from flexik.kinematics.crane_manipulator import CraneManipulator, geometry_of
 from flexik.positioning.method import Method
 from flexik.reporting.tables import markdown, write_table
 
-DATA = Path("data/crane")
 OUTPUT = Path("reports/benchmarks/positioning")
 N_REPEATS = 3
 N_WARM_UP = 3  # queries
@@ -46,80 +47,52 @@ MICROSECONDS = 1e6
 
 
 @dataclass(frozen=True, eq=False)
-class Queries:
-    """Targets (n, 2) in m, payload (n,) in kg, current strokes (n, 3) in m."""
-
-    targets: NDArray[np.float64]
-    payload: NDArray[np.float64]
-    strokes: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, conditions: Conditions, geometry: CraneGeometry) -> "Queries":
-        """Queries from the initial positions the evaluation has."""
-        strokes = initial_positions(geometry, conditions.targets)
-        return cls(conditions.targets, conditions.payload, strokes)
-
-    def __len__(self) -> int:
-        return len(self.targets)
-
-
-@dataclass(frozen=True, eq=False)
 class Case:
     """A method and what it is asked, one at a time and at once."""
 
     method: Method
-    single: Queries
-    batch: Queries
+    single: Conditions
+    batch: Conditions
 
 
 def cases() -> dict[str, Case]:
-    """All methods by name, `none` first; raises DataError naming what `make repro` has to make."""
-    crane = load_parameters().crane
-    geometry = CraneGeometry(**crane.geometry.model_dump())
+    """All methods by name; raises DataError naming what `make repro` has to make."""
+    section = load("crane")
+    manipulator = CraneManipulator(geometry_of(section.machine))
     try:
-        stiffness = read_spring_stiffness(DATA / "calibration.json")
-        made_with = targets_checksum(crane, stiffness)
-        table = read_table(DATA / "targets.parquet", TARGET_FIELDS, made_with)
-        methods = {
-            name: trained_method(crane, name, geometry, stiffness, DATA / "networks")
-            for name in ("none", *crane.methods)
-        }
+        table = read_table(SAMPLES / "workspace.parquet", TARGET_FIELDS)
+        methods = {name: method_of(section, name) for name in section.methods}
     except DataError as error:
         raise DataError(f"run `make repro` first: {error}") from error
-    conditions = all_conditions(crane.evaluation.points, crane.evaluation.payloads)
-    single = Queries.of(conditions, geometry)
-    found = {}
-    for name, method in methods.items():
-        limited = name in crane.methods
-        rows = table.head(crane.methods[name].n_workspace_targets) if limited else table
-        batch = random_conditions(rows[["target_x", "target_y"]], rows["payload"])
-        found[name] = Case(method, single, Queries.of(batch, geometry))
-    return found
+    queries = table[[field.name for field in TARGET_FIELDS[:3]]].to_numpy()
+    batch = at(queries, np.arange(len(queries)), manipulator)
+    single = at_points(section.conditions["published"], manipulator)
+    return {
+        name: Case(method, single, batch[: section.methods[name].n_targets])
+        for name, method in methods.items()
+    }
 
 
-def seconds_single(method: Method, queries: Queries) -> float:
-    """Median over `queries` of the seconds of a call with one of them."""
-    rows = [
-        (queries.targets[one], queries.payload[one], queries.strokes[one])
-        for one in (slice(k, k + 1) for k in range(len(queries)))
-    ]
+def seconds_single(method: Method, asked: Conditions) -> float:
+    """Median over `asked` of the seconds of a call with one of them."""
+    rows = asked.chunks(1)
     for row in rows[:N_WARM_UP]:
-        method(*row)
+        method(row.query, row.current)
     seconds = []
     for row in rows:
         started = time.perf_counter()
-        method(*row)
+        method(row.query, row.current)
         seconds.append(time.perf_counter() - started)
     return statistics.median(seconds)
 
 
-def seconds_batched(method: Method, queries: Queries) -> float:
-    """Seconds of a call with all `queries`, over their number; nan without any."""
-    if not len(queries):
+def seconds_batched(method: Method, asked: Conditions) -> float:
+    """Seconds of a call with all `asked`, over their number; nan without any."""
+    if not len(asked):
         return math.nan
     started = time.perf_counter()
-    method(queries.targets, queries.payload, queries.strokes)
-    return (time.perf_counter() - started) / len(queries)
+    method(asked.query, asked.current)
+    return (time.perf_counter() - started) / len(asked)
 
 
 def measure() -> pd.DataFrame:
@@ -127,15 +100,13 @@ def measure() -> pd.DataFrame:
 
     In each repeat all methods follow one another: a machine that is busy is so for all.
     """
-    with threadpool_limits(1):
-        known = cases()
-        seconds: dict[str, list[tuple[float, float]]] = {name: [] for name in known}
-        for repeat in range(N_REPEATS):
-            for name, case in known.items():
-                alone = seconds_single(case.method, case.single)
-                seconds[name].append((alone, seconds_batched(case.method, case.batch)))
-            print(f"positioning, repeat {repeat + 1} of {N_REPEATS}", flush=True)
-    crane = load_parameters().crane
+    known, section = cases(), load("crane")
+    seconds: dict[str, list[tuple[float, float]]] = {name: [] for name in known}
+    for repeat in range(N_REPEATS):
+        for name, case in known.items():
+            alone = seconds_single(case.method, case.single)
+            seconds[name].append((alone, seconds_batched(case.method, case.batch)))
+        print(f"positioning, repeat {repeat + 1} of {N_REPEATS}", flush=True)
     rows = []
     for name, pairs in seconds.items():
         alone, batched = (
@@ -148,7 +119,7 @@ def measure() -> pd.DataFrame:
                 "microseconds_batched": batched,
                 "n_single": len(known[name].single),
                 "n_batched": len(known[name].batch),
-                "settings": query_checksum(crane, name),
+                "settings": query_key(section, name),
             }
         )
     return pd.DataFrame(rows)
@@ -170,8 +141,6 @@ def notes(load: Mapping[str, float]) -> list[str]:
 
 def main() -> None:
     """Measure and report."""
-    # before the process imports NumPy
-    os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     started, load = time.perf_counter(), {"start": os.getloadavg()[0]}
     with pinned_pool(1) as pool:
         table = pool.submit(measure).result()

@@ -58,6 +58,7 @@ def test_missing_data_are_an_error_that_says_what_makes_them(tmp_path, monkeypat
     from positioning import cases
 
     shutil.copy(ROOT / "params.yaml", tmp_path)
+    shutil.copytree(ROOT / "data/machines", tmp_path / "data/machines")
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(DataError, match=r"run `make repro` first: .*calibration\.json"):
+    with pytest.raises(DataError, match=r"run `make repro` first: .*workspace\.parquet"):
         cases()
