@@ -22,9 +22,11 @@ def flatten(weights: Sequence[Array]) -> Array:
 
 def unflatten(vector: Array, like: Weights) -> Weights:
     """Matrices of the shapes of `like`, the inverse of `flatten`; views of `vector`."""
-    ends = np.cumsum([matrix.size for matrix in like])[:-1]
-    parts = np.split(vector, ends)
-    return tuple(part.reshape(matrix.shape) for part, matrix in zip(parts, like, strict=True))
+    parts, end = [], 0
+    for matrix in like:
+        start, end = end, end + matrix.size
+        parts.append(vector[start:end].reshape(matrix.shape))
+    return tuple(parts)
 
 
 def moved(weights: Weights, step: Array) -> Weights:
