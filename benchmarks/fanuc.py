@@ -20,67 +20,53 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import py_opw_kinematics as opw
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 from threadpoolctl import threadpool_limits
 
-from flexik import parameters, stage
-from flexik.datasets.fanuc.tables import (
-    POSE_FIELDS,
-    growth_checksum,
-    joints_of_rows,
-    poses_checksum,
-    query_checksum,
-    read_path,
-)
+from flexik import stage
+from flexik.cases.case import load
+from flexik.cases.fanuc.parts import evaluate
+from flexik.cases.fanuc.parts.samples import arm_of
+from flexik.cases.fanuc.parts.tables import JOINT_FIELDS, POSE_FIELDS, QUERY_FIELDS, array
+from flexik.cases.fanuc.parts.train import workspace_lesson
+from flexik.cases.fanuc.report_results import growth_settings, judged, label, query_settings
+from flexik.cases.fanuc.section import WHOLE, Section
 from flexik.datasets.tables import read_table
 from flexik.errors import DataError, FlexikError
-from flexik.evaluation.fanuc.errors import statistics as error_statistics
-from flexik.evaluation.fanuc.errors import workspace_errors
-from flexik.learning.training import Architecture, trainer_settings
-from flexik.kinematics.serial_arm import Pose, SerialArm, forward
-from flexik.parameters import load_parameters
-from flexik.positioning.fanuc.methods import (
-    JointMethod,
-    closed_form,
-    interpolated,
-    nearest_sample,
-    path_networks,
-    refined,
-    workspace_networks,
-)
-from flexik.positioning.fanuc.networks import load_path_networks, load_workspace_networks
-from flexik.positioning.fanuc.training import WorkspaceTask, train_workspace
+from flexik.kinematics.pose_representation import asked
+from flexik.kinematics.serial_arm import Array, SerialArm
+from flexik.learning.training import Architecture, train
+from flexik.positioning.arm_configurations import ArmConfigurations
+from flexik.positioning.method import Method
+from flexik.positioning.refined import Refined
 from flexik.reporting.tables import write_table
 
-DATA, OUTPUT = Path("data/fanuc"), Path("reports/benchmarks")
+SAMPLES, OUTPUT = Path("data/fanuc/samples"), Path("reports/benchmarks")
 N_REPEATS, N_SINGLE, N_BATCHED = 15, 200, 2000
 MICROSECONDS, MM, DEGREES = 1e6, 1e3, 180.0 / np.pi
 # Hidden neurons of each layer, passes
 GROWTH = (
-    *(((40, 40), 15), ((40, 40), 60), ((80, 80), 15), ((80, 80), 60)),
-    *(((80, 80), 240), ((160, 160), 60)),
+    *(((32, 32), 12), ((32, 32), 50), ((64, 64), 12), ((64, 64), 50)),
+    *(((64, 64), 200), ((128, 128), 50)),
 )
 
 
-def methods(fanuc: parameters.Fanuc, arm: SerialArm) -> dict[str, JointMethod]:
+def methods(section: Section, arm: SerialArm) -> dict[str, Method]:
     """All methods by name."""
     try:
-        known = {
-            name: path_networks(load_path_networks(DATA / "networks", fanuc, name))
-            for name in fanuc.networks
-        }
-        whole = workspace_networks(arm, load_workspace_networks(DATA / "workspace_networks", fanuc))
+        known = {name: evaluate.method(section, name) for name in section.methods}
     except DataError as error:
         raise DataError(f"run `make repro` first: {error}") from error
-    steps = fanuc.refinement
-    for n_steps in range(steps.n_steps + 1):
-        name = f"whole_workspace_refined_{n_steps}" if n_steps else "whole_workspace"
-        known[name] = refined(arm, whole, n_steps, steps.damping, steps.orientation_length)
-    training, _ = read_path(DATA / "path.parquet", fanuc)
-    taught = training[["x", "y", "z"]].to_numpy(), joints_of_rows(training)
-    known |= {"nearest_sample": nearest_sample(*taught), "interpolated": interpolated(*taught)}
-    return known | {"closed_form": closed_form(arm)}
+    steps = section.conditions.refinement
+    for n_steps in range(1, steps.n_steps + 1):
+        known[label(WHOLE, n_steps)] = refined(section, arm, known[WHOLE], n_steps)
+    return known
+
+
+def refined(section: Section, arm: SerialArm, method: Method, n_steps: int) -> Refined:
+    """Newton steps of the section after `method`."""
+    steps = section.conditions.refinement
+    return Refined(arm, method, n_steps, steps.damping, steps.orientation_length)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,34 +79,34 @@ class Case:
     batch: tuple[Any, ...]
 
 
-def opw_case(fanuc: parameters.Fanuc, target: Pose) -> Case:
+def opw_case(arm: SerialArm, query: Array) -> Case:
     """All configurations by the independent package; of a batch it keeps one of each pose."""
-    d, a = ([getattr(joint, name) for joint in fanuc.joints] for name in ("d", "a"))
+    d, a = arm.d, arm.a
     model = opw.KinematicModel(
         a1=a[0], a2=-a[2], b=0.0, c1=d[0], c2=a[1], c3=abs(d[3]), c4=abs(d[5])
     )
-    robot = opw.Robot(model, degrees=False)
-    matrices = np.tile(np.eye(4), (len(target.position), 1, 1))
+    robot, target = opw.Robot(model, degrees=False), asked(query)[0]
+    matrices = np.tile(np.eye(4), (len(query), 1, 1))
     matrices[:, :3, :3], matrices[:, :3, 3] = target.rotation, target.position
     poses = RigidTransform.from_matrix(matrices)
     single = [(poses[k],) for k in range(min(N_SINGLE, len(matrices)))]
     return Case(robot.inverse, single, robot.batch_inverse, (poses,))
 
 
-def own_case(method: JointMethod, target: Pose, number: NDArray[np.int64]) -> Case:
+def own_case(method: Method, query: Array) -> Case:
     """A method of this repository."""
-    rows = [slice(k, k + 1) for k in range(min(N_SINGLE, len(number)))]
-    single = [(target.rows(one), number[one]) for one in rows]
-    return Case(method, single, method, (target, number))
+    current = np.zeros((len(query), 6))
+    single = [(query[k : k + 1], current[:1]) for k in range(min(N_SINGLE, len(query)))]
+    return Case(method, single, method, (query, current))
 
 
-def measure(fanuc: parameters.Fanuc, arm: SerialArm) -> pd.DataFrame:
+def measure(section: Section, arm: SerialArm) -> pd.DataFrame:
     """A row for every method; in each repeat all follow one another."""
-    poses = read_table(DATA / "target_poses.parquet", POSE_FIELDS, poses_checksum(fanuc))
+    poses = read_table(SAMPLES / "conditions/random_poses.parquet")
     poses = poses.sample(min(N_BATCHED, len(poses)), random_state=1)
-    target, number = forward(arm, joints_of_rows(poses)), poses["configuration"].to_numpy()
-    known = {name: own_case(method, target, number) for name, method in methods(fanuc, arm).items()}
-    known["opw"] = opw_case(fanuc, target)
+    query = np.ascontiguousarray(array(poses, QUERY_FIELDS))
+    known = {name: own_case(method, query) for name, method in methods(section, arm).items()}
+    known["opw"] = opw_case(arm, query)
     seconds: dict[str, list[tuple[float, float]]] = {name: [] for name in known}
     for _ in range(N_REPEATS):
         for name, case in known.items():
@@ -131,7 +117,7 @@ def measure(fanuc: parameters.Fanuc, arm: SerialArm) -> pd.DataFrame:
             "method": name,
             "microseconds_single": MICROSECONDS * min(pair[0] for pair in pairs),
             "microseconds_batched": MICROSECONDS * min(pair[1] for pair in pairs),
-            "settings": query_checksum(fanuc),
+            "settings": query_settings(section),
         }
         for name, pairs in seconds.items()
     ]
@@ -145,42 +131,36 @@ def timed(query: Callable[..., object], arguments: tuple[Any, ...]) -> float:
     return time.perf_counter() - started
 
 
-def grow(fanuc: parameters.Fanuc, arm: SerialArm) -> pd.DataFrame:
+def grow(section: Section, arm: SerialArm) -> pd.DataFrame:
     """A row a network of GROWTH."""
-    made_with, space = poses_checksum(fanuc), fanuc.workspace
-    training, targets = (
-        read_table(DATA / f"{name}_poses.parquet", POSE_FIELDS, made_with)
-        for name in ("training", "target")
+    poses, targets = (
+        read_table(SAMPLES / "poses.parquet", POSE_FIELDS),
+        read_table(SAMPLES / "conditions/random_poses.parquet"),
     )
-    joints, asked = (joints_of_rows(t[t["configuration"] == 0]) for t in (training, targets))
-    target, number = forward(arm, asked), np.zeros(len(asked), dtype=np.int64)
-    steps, rows = fanuc.refinement, []
+    joints = array(poses[poses["configuration"] == 0], JOINT_FIELDS)
+    query = array(targets[targets["configuration"] == 0], QUERY_FIELDS)
+    network, rows = section.networks[WHOLE], []
     for n_hidden, n_iterations in GROWTH:
-        trainer = fanuc.trainers[space.trainer].model_dump() | {"n_iterations": n_iterations}
-        settings = trainer_settings(trainer.pop("kind"), trainer)
-        architecture = Architecture(n_hidden, space.activation)
-        task = WorkspaceTask(arm, 0, joints, architecture, settings, space.seed)
+        settings = section.trainers[network.trainer].but(n_iterations=n_iterations)
+        architecture = Architecture(n_hidden, network.activation)
+        lesson = workspace_lesson(arm, joints, architecture, settings, network.seed)
         started = time.process_time()
-        network, _ = train_workspace(task)
+        found, _ = train(lesson)
         seconds = time.process_time() - started
-        plain = workspace_networks(arm, {0: network})
-        method = refined(arm, plain, 3, steps.damping, steps.orientation_length)
-        before, after = (
-            error_statistics(
-                pd.DataFrame(workspace_errors(arm, target, number, each(target, number))),
-                fanuc.success.model_dump(),
-            )
-            for each in (plain, method)
-        )
+        plain = ArmConfigurations(arm, {0: found})
+        steps = section.conditions.refinement.model_copy(update={"n_steps": 3})
+        errors = pd.DataFrame(evaluate.errors_of(evaluate.Item(arm, plain, query, steps)))
+        before, after = (errors[errors["n_steps"] == n_steps] for n_steps in (0, 3))
+        reached = judged(after, section.success)["reached"]
         rows.append(
             {
                 "n_hidden": " and ".join(map(str, n_hidden)),
                 "n_iterations": n_iterations,
                 "seconds": seconds,
-                "mean_position_error_mm": MM * before["mean_position_error"],
-                "mean_orientation_error_deg": DEGREES * before["mean_orientation_error"],
-                "success_percent": 100.0 * after["success_rate"],
-                "settings": growth_checksum(fanuc),
+                "mean_position_error_mm": MM * before["error"].mean(),
+                "mean_orientation_error_deg": DEGREES * before["orientation_error"].mean(),
+                "success_percent": 100.0 * reached.mean(),
+                "settings": growth_settings(section),
             }
         )
         print(rows[-1], flush=True)
@@ -192,13 +172,13 @@ def main() -> None:
     if sys.argv[1:] not in ([], ["times"], ["growth"]):
         raise FlexikError("usage: fanuc.py [times | growth]")
     chosen = sys.argv[1:] or ["times", "growth"]
-    fanuc = load_parameters().fanuc
-    arm = SerialArm.from_rows([joint.model_dump() for joint in fanuc.joints])
+    section = load("fanuc")
+    arm = arm_of(section.machine.joints)
     machine = f"One core, one BLAS thread; numpy {version('numpy')}, py-opw-kinematics "
     machine += f"{version('py-opw-kinematics')}."
     with threadpool_limits(1):
         if "times" in chosen:
-            table = measure(fanuc, arm)
+            table = measure(section, arm)
             remarks = [
                 f"single: one pose a call, the median of {N_SINGLE} poses; batched: one call with "
                 f"{N_BATCHED} poses, the time over their number. Least of {N_REPEATS} repeats.",
@@ -209,7 +189,7 @@ def main() -> None:
             decimals = {"microseconds_single": 1, "microseconds_batched": 2}
             write_table(OUTPUT / "fanuc", table, decimals, "Microseconds a pose.", remarks)
         if "growth" in chosen:
-            table = grow(fanuc, arm)
+            table = grow(section, arm)
             caption = "Networks of the whole workspace, arm configuration 0; seconds of a core."
             remarks = ["One start each.", machine]
             write_table(OUTPUT / "fanuc_growth", table, 2, caption, remarks)

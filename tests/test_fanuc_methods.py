@@ -275,8 +275,8 @@ def test_a_workspace_network_learns_poses_of_its_configuration():
     joints = canonical(ARM, random_joints(4000, seed=8))
     joints = joints[configuration(ARM, joints) == 2]
     settings = Adam(n_iterations=40, batch_size=20, learning_rate=0.01, final_rate=0.0)
-    item = train.WorkspaceItem(ARM, 2, joints, Architecture((20, 20)), settings, seed=1)
-    network, record = train.trained(train.train_workspace(item))
+    lesson = train.workspace_lesson(ARM, joints, Architecture((20, 20)), settings, seed=1)
+    network, record = train.trained(train.train_workspace((lesson, 2)))
     assert record.errors[record.kept] < 0.4 * record.errors[0]
     found = ArmConfigurations(ARM, {2: network})(query_of(joints), joints).values
     assert np.isfinite(found).all() and (found[:, 4] >= 0.0).all()

@@ -17,6 +17,7 @@ from flexik.cases.fanuc.parts.tables import COMMANDED_FIELDS, JOINT_FIELDS, name
 from flexik.cases.fanuc.report_results import (
     Results,
     growth_settings,
+    judged,
     label,
     published,
     query_settings,
@@ -124,13 +125,6 @@ def random_poses():
     yield rows_of("random_poses", EXACT, 0, np.full(40, 3e-16), **columns)
 
 
-def judged(errors):
-    """With the columns that tell what counts as reached."""
-    near = (errors["error"] <= 1e-3) & (errors["orientation_error"] <= 1.745329e-3)
-    met = near & (errors["status"] == 0)
-    return errors.assign(met=met, reached=met & (errors["in_configuration"] == 1))
-
-
 @pytest.fixture(scope="module")
 def results():
     found = taught_path(ARM, SECTION.samples.path)
@@ -148,7 +142,9 @@ def results():
         curves=curves(),
         start_errors=pd.DataFrame(shifts, columns=["network", "restart", "mean_error", "a", "b"]),
         studies=studies(),
-        errors=judged(pd.concat([*on_path(path), *beside_path(), *random_poses()])),
+        errors=judged(
+            pd.concat([*on_path(path), *beside_path(), *random_poses()]), SECTION.success
+        ),
         published=pd.DataFrame({"config1": np.nan, "config2": np.nan}, index=range(1, 7)),
         times=pd.DataFrame({"method": [WHOLE, "opw"], **times}),
         growth=pd.DataFrame(columns=["n_hidden", "n_iterations"]),
@@ -266,7 +262,7 @@ def test_targets_beside_the_path_are_told_about(results):
     far = (changed["distance"] > 0.0) & (changed["method"] == "config1")
     changed.loc[far, "status"] = 2
     changed.loc[beside & (changed["method"] == "config2") & (changed["distance"] == 0), "error"] = 0
-    text = page(but(results, errors=judged(changed)))
+    text = page(but(results, errors=judged(changed, SECTION.success)))
     assert "config1_refined_3: reaches all targets up to 0 mm" in text
     assert "config2 at 1 of 2 distances (0 mm)" in text
 
@@ -289,7 +285,7 @@ def test_networks_are_compared_with_what_needs_none(results):
 def test_another_configuration_than_asked_for_does_not_count(results):
     changed = results.errors.reset_index(drop=True)
     changed.loc[(changed["configuration"] == 3) & (changed["n_steps"] == 3), "in_configuration"] = 0
-    changed = but(results, errors=judged(changed))
+    changed = but(results, errors=judged(changed, SECTION.success))
     assert changed.statistics["random_poses"].loc[f"{WHOLE}_refined_3", "reached"] == 0.875
     assert f"{WHOLE}_refined_2 0.00 %, {WHOLE}_refined_3 12.50 %" in page(changed)
 
@@ -311,7 +307,7 @@ def test_times_stand_beside_the_methods_they_were_measured_for(results):
 def test_poses_are_counted_by_how_singular_they_are(results):
     changed = results.errors.copy()
     changed.loc[(changed["singular_value"] < 0.01) & (changed["method"] == WHOLE), "status"] = 2
-    table = frame(but(results, errors=judged(changed)), "conditioning")
+    table = frame(but(results, errors=judged(changed, SECTION.success)), "conditioning")
     assert table["poses"].tolist() == [16, 8, 0, 8, 8]
     assert table["smallest singular value (m)"].iloc[[0, -1]].tolist() == ["0 to 0.01", "over 0.3"]
     after = table[f"{WHOLE}_refined_3"]

@@ -1,6 +1,7 @@
 """Figures of the six-joint arm; mm and degrees."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,11 +20,13 @@ from flexik.reporting.style import DEGREES, MM
 SHARE = Axis("share of the path's duration (1)")
 # Errors below are round-off, mm and degrees
 FLOOR = 1e-7
-BY_JOINT: dict[str, Any] = {"panel": "joint", "columns": 2, "height": 8.0}
 ERRORS = {
     "error": Axis("position error (mm)", MM, log=True, least=FLOOR),
     "orientation_error": Axis("orientation error (deg)", DEGREES, log=True, least=FLOOR),
 }
+THIN = {"linewidth": 0.9, "marker": ""}
+UNTITLED = dict.fromkeys(ERRORS, "")
+REACHED = Axis("", 100.0, limits=(-4.0, 104.0))
 
 
 def looks(results: Results) -> dict[Any, dict[str, Any]]:
@@ -54,19 +57,57 @@ def _kind(results: Results, name: str) -> str:
 
 def figures(results: Results) -> dict[str, Drawing]:
     """All figures."""
-    of_kind = {
+    by_kind = {
         kind: [name for name in results.networks if _kind(results, name) == kind]
         for kind in trainer_kinds(results)
     }
-    shown = of_kind.get("back_propagation", results.networks)
+    shown = by_kind.get("back_propagation", results.networks)
+    look = looks(results)
+    by_joint = {"panel": "joint", "columns": 2, "height": 8.0, "share": "x", "looks": look}
+    rows = results.of("path")
+    taught = _by_joint(results.path[results.path["is_test"] == 1], angle=JOINT_FIELDS)
+    found = _by_joint(rows, angle=COMMANDED_FIELDS, taught=JOINT_FIELDS)
+    found["error"] = (found["angle"] - found["taught"]).abs()
+    ink, dots = {"color": style.INK, "linewidth": 1.4}, {"markersize": 3.0, "markeredgewidth": 0.7}
+    of_path = found[found["method"].isin(results.section.path_methods)]
+    ends = rows[rows["method"] != EXACT].melt(["share", "method"], list(ERRORS), "kind")
     return {
         "arm": _arm(results),
-        **{f"training_error_{k}": _training(results, names) for k, names in of_kind.items()},
-        "path_tracking": _tracking(results, shown),
-        "path_tracking_errors": _tracking_errors(results),
-        "path_errors": _path_errors(results),
+        **{
+            f"training_error_{kind}": draw(
+                chart,
+                *_training(results, names),
+                x=Axis("passes over the training samples (1)"),
+                y=Axis("rms error (% of range)", 100.0, log=True),
+                **by_joint,
+            )
+            for kind, names in by_kind.items()
+        },
+        "path_tracking": draw(
+            chart,
+            Layer(taught, "share", "angle", look=ink, label="taught"),
+            Layer(found[found["method"].isin(shown)], "share", "angle", "o", "method", look=dots),
+            x=SHARE,
+            y=Axis("angle (deg)", DEGREES),
+            **by_joint,
+        ),
+        "path_tracking_errors": draw(
+            chart,
+            Layer(of_path, "share", "error", "-", "method", look=THIN),
+            x=SHARE,
+            y=Axis("error (deg)", DEGREES, log=True, least=FLOOR),
+            **by_joint,
+        ),
+        "path_errors": draw(
+            chart,
+            Layer(ends, "share", "value", "-", "method", look=THIN),
+            x=SHARE,
+            y=ERRORS,
+            titles=UNTITLED,
+            **by_joint | {"panel": "kind", "columns": 1, "height": 6.0},
+        ),
         **{f"study_{name}": _study(results, name) for name in results.studies},
-        "off_path": _off_path(results),
+        "off_path": _off_path(results, look),
         "whole_workspace": _whole_workspace(results),
     }
 
@@ -112,153 +153,56 @@ def _arm(results: Results) -> Drawing:
 def _by_joint(frame: pd.DataFrame, **columns: Sequence[Field]) -> pd.DataFrame:
     """Rows of share and method by joint, with `columns` of all six joints under one name."""
     keep = frame[[name for name in ("share", "method") if name in frame]]
-    parts = [
-        keep.assign(
-            joint=f"joint {k + 1}",
-            **{name: frame[fields[k].name] for name, fields in columns.items()},
-        )
+    parts = (
+        keep.assign(joint=f"joint {k + 1}", **{n: frame[of[k].name] for n, of in columns.items()})
         for k in range(len(JOINT_FIELDS))
-    ]
+    )
     return pd.concat(parts)
 
 
-def _training(results: Results, names: list[str]) -> Drawing:
+def _training(results: Results, names: list[str]) -> list[Layer]:
     """All starts of some networks; the median start in full."""
     keys = ["network", "restart", "joint"]
     curves = results.curves.merge(results.starts[[*keys, "is_median"]], on=keys)
     curves = curves[curves["network"].isin(names)].sort_values([*keys, "iteration"])
     curves["joint"] = "joint " + curves["joint"].astype(str)
-    parts = [
-        (0, {"linewidth": 0.5, "alpha": 0.35, "marker": ""}, ""),
-        (1, {"linewidth": 0.9, "alpha": 0.9, "marker": ""}, "{}"),
-    ]
-    return draw(
-        chart,
-        *(
-            Layer(rows, "iteration", "training_error", "-", "network", "restart", text, look)
-            for median, look, text in parts
-            if len(rows := curves[curves["is_median"] == median])
-        ),
-        x=Axis("passes over the training samples (1)"),
-        y=Axis("rms error (% of range)", 100.0, log=True),
-        share="x",
-        looks=looks(results),
-        **BY_JOINT,
-    )
-
-
-def _tracking(results: Results, names: list[str]) -> Drawing:
-    rows = results.of("path")
-    taught = _by_joint(results.path[results.path["is_test"] == 1], angle=JOINT_FIELDS)
-    found = _by_joint(rows[rows["method"].isin(names)], angle=COMMANDED_FIELDS)
-    small = {"markersize": 3.0, "markeredgewidth": 0.7}
-    return draw(
-        chart,
-        Layer(
-            taught, "share", "angle", look={"color": style.INK, "linewidth": 1.4}, label="taught"
-        ),
-        Layer(found, "share", "angle", "o", "method", look=small),
-        x=SHARE,
-        y=Axis("angle (deg)", DEGREES),
-        share="x",
-        looks=looks(results),
-        **BY_JOINT,
-    )
-
-
-def _tracking_errors(results: Results) -> Drawing:
-    rows = results.of("path")
-    rows = rows[rows["method"].isin(results.section.path_methods)]
-    found = _by_joint(rows, angle=COMMANDED_FIELDS, taught=JOINT_FIELDS)
-    found = found.assign(error=(found["angle"] - found["taught"]).abs())
-    return draw(
-        chart,
-        Layer(found, "share", "error", "-", "method", look={"linewidth": 0.9, "marker": ""}),
-        x=SHARE,
-        y=Axis("error (deg)", DEGREES, log=True, least=FLOOR),
-        share="x",
-        looks=looks(results),
-        **BY_JOINT,
-    )
-
-
-def _path_errors(results: Results) -> Drawing:
-    rows = results.of("path")
-    rows = rows[rows["method"] != EXACT].melt(["share", "method"], list(ERRORS), "kind")
-    return draw(
-        chart,
-        Layer(rows, "share", "value", "-", "method", look={"linewidth": 1.0, "marker": ""}),
-        x=SHARE,
-        y=ERRORS,
-        looks=looks(results),
-        titles=dict.fromkeys(ERRORS, ""),
-        panel="kind",
-        columns=1,
-        share="x",
-        height=6.0,
-    )
+    pale = {"linewidth": 0.5, "alpha": 0.35, "marker": ""}
+    layers = []
+    for is_median, look, text in ((0, pale, ""), (1, THIN, "{}")):
+        rows = curves[curves["is_median"] == is_median]
+        if len(rows):
+            place = ("iteration", "training_error", "-", "network", "restart")
+            layers.append(Layer(rows, *place, text, look))
+    return layers
 
 
 def _study(results: Results, varied: str) -> Drawing:
-    groups = results.studies[varied].groupby("value")
-    errors = groups.agg(
-        least=("error_percent", "min"),
-        largest=("error_percent", "max"),
-        median=("error_percent", "median"),
-        training=("training_percent", "median"),
-    ).reset_index()
+    errors = results.study_statistics(varied)
     blue, orange = {"color": style.BLUE, "marker": "o"}, {"color": style.ORANGE, "marker": "s"}
-    band = {"color": style.SKY, "alpha": 0.3}
+    band = Layer(errors, "value", "least", "band", to="largest", look={"color": style.SKY})
+    what = "hidden neurons" if varied == "n_hidden" else "learning factor"
+    labels = ("total error on the test samples, median", "the same on the training samples, median")
     return draw(
         chart,
-        Layer(
-            errors,
-            "value",
-            "least",
-            "band",
-            to="largest",
-            look=band,
-            label="total error, all starts",
-        ),
-        Layer(
-            errors,
-            "value",
-            "median",
-            "o-",
-            look=blue,
-            label="total error on the test samples, median",
-        ),
-        Layer(
-            *(errors, "value", "training", "s--"),
-            look=orange,
-            label="the same on the training samples, median",
-        ),
-        x=Axis(
-            f"{varied.replace('n_hidden', 'hidden neurons').replace('_', ' ')} (1)",
-            log=True,
-            ticks=list(errors["value"]),
-        ),
+        replace(band, label="total error, all starts"),
+        Layer(errors, "value", "median", "o-", look=blue, label=labels[0]),
+        Layer(errors, "value", "training", "s--", look=orange, label=labels[1]),
+        x=Axis(f"{what} (1)", log=True, ticks=list(errors["value"])),
         y=Axis("mean absolute error (% of range)", log=True),
         titles=f"joint {getattr(results.section.studies, varied).joint}",
         height=4.0,
     )
 
 
-def _off_path(results: Results) -> Drawing:
-    rows = results.of("off_path")
-    rows = rows[rows["method"] != EXACT]
-    last = results.n_steps
-    means = rows.groupby(["method", "n_steps", "distance"], sort=False)[
-        ["error", "orientation_error", "reached"]
-    ].mean()
+def _off_path(results: Results, look: dict[Any, dict[str, Any]]) -> Drawing:
+    rows, last = results.of("off_path"), results.n_steps
+    groups = rows[rows["method"] != EXACT].groupby(["method", "n_steps", "distance"], sort=False)
+    means = groups[["error", "orientation_error", "reached"]].mean()
     contents = {
         "mean position error (mm)": ("error", 0, Axis("", MM, log=True)),
         "mean orientation error (deg)": ("orientation_error", 0, Axis("", DEGREES, log=True)),
-        "reached after 1 Newton step (%)": ("reached", 1, Axis("", 100.0, limits=(-4.0, 104.0))),
-        f"reached after {last} Newton steps (%)": (
-            *("reached", last),
-            Axis("", 100.0, limits=(-4.0, 104.0)),
-        ),
+        "reached after 1 Newton step (%)": ("reached", 1, REACHED),
+        f"reached after {last} Newton steps (%)": ("reached", last, REACHED),
     }
     distances = results.section.conditions.off_path.distances
     table = pd.concat(
@@ -272,7 +216,7 @@ def _off_path(results: Results) -> Drawing:
         Layer(table, "place", "value", "o-", "method", look={"markersize": 3.5, "marker": "o"}),
         x=Axis("distance from the path (mm)", ticks=ticks),
         y={title: axis for title, (_, _, axis) in contents.items()},
-        looks=looks(results),
+        looks=look,
         panel="panel",
         columns=2,
         share="x",
@@ -281,7 +225,7 @@ def _off_path(results: Results) -> Drawing:
 
 
 def _whole_workspace(results: Results) -> Drawing:
-    rows = results.of("random_poses").melt(["label"], list(ERRORS), "kind", "error_of_kind")
+    rows = results.of("random_poses").melt(["label"], list(ERRORS), "kind", "of_kind")
     limits = results.section.success
     # the colour the method has elsewhere, the more steps the darker; none as light as paper
     shades = style.shades(range(-results.n_steps, 3), "Oranges_r")
@@ -289,15 +233,15 @@ def _whole_workspace(results: Results) -> Drawing:
     cut = {"color": style.GREY, "linestyle": "--"}
     return draw(
         kinds.distribution,
-        *(rows, "error_of_kind", "label", ERRORS),
+        *(rows, "of_kind", "label", ERRORS),
         panel="kind",
         what="poses",
         looks=colours | {EXACT: {"color": style.INK}},
         rules=[
-            Rule("x", MM * limits.position, "counts as reached", cut, panel="error"),
-            Rule("x", DEGREES * limits.orientation, "", cut, panel="orientation_error"),
+            Rule("x", MM * limits.position, "counts as reached", cut, "error"),
+            Rule("x", DEGREES * limits.orientation, "", cut, "orientation_error"),
         ],
-        titles=dict.fromkeys(ERRORS, ""),
+        titles=UNTITLED,
         columns=2,
         height=4.4,
     )

@@ -18,7 +18,7 @@ from flexik.cases.fanuc.parts.tables import (
     QUERY_FIELDS,
     array,
 )
-from flexik.cases.fanuc.section import PUBLISHED_NETWORKS, Section
+from flexik.cases.fanuc.section import PUBLISHED_NETWORKS, Section, Success
 from flexik.datasets.tables import read_csv, read_table
 from flexik.errors import DataError
 from flexik.kinematics.serial_arm import Array, SerialArm
@@ -192,17 +192,17 @@ def _errors(section: Section, part: str) -> pd.DataFrame:
     asked = read_table(DATA / f"samples/conditions/{conditions}.parquet")
     found = read_table(DATA / f"errors/{part}.parquet").drop(columns=queries)
     found = found.join(asked.drop(columns=queries), on="point")
-    limits = section.success
-    near = (found["error"] <= limits.position) & (found["orientation_error"] <= limits.orientation)
-    met = near & (found["status"] == REACHED)
     labels = found["n_steps"].map(lambda n_steps: label(method, n_steps))
-    return found.assign(
-        conditions=conditions,
-        method=method,
-        label=labels,
-        met=met,
-        reached=met & (found["in_configuration"] == 1),
-    )
+    named = found.assign(conditions=conditions, method=method, label=labels)
+    return judged(named, section.success)
+
+
+def judged(errors: pd.DataFrame, success: Success) -> pd.DataFrame:
+    """`errors` with columns `met`, and `reached` in the arm configuration asked for."""
+    near = errors["error"] <= success.position
+    near &= errors["orientation_error"] <= success.orientation
+    met = near & (errors["status"] == REACHED)
+    return errors.assign(met=met, reached=met & (errors["in_configuration"] == 1))
 
 
 def published(path: Path) -> pd.DataFrame:

@@ -23,7 +23,7 @@ from flexik.datasets.parts import Columns, Part, Work, Writer, stacked, table
 from flexik.datasets.tables import read_table
 from flexik.kinematics.pose_representation import INPUTS, OUTPUTS, joint_outputs, pose_inputs
 from flexik.kinematics.serial_arm import Array, SerialArm, forward
-from flexik.kinematics.spherical_wrist import N_CONFIGURATIONS, canonical
+from flexik.kinematics.spherical_wrist import canonical
 from flexik.learning.perceptron import Network, Quantity
 from flexik.learning.stopping import StopReason
 from flexik.learning.storage import network_file, packed, unpacked
@@ -173,38 +173,14 @@ def _files(samples: TaughtSamples, results: list[Columns]) -> Mapping[str, Write
     }
 
 
-@dataclass(frozen=True, eq=False)
-class WorkspaceItem:
-    """The network of arm configuration `number`, from joints (n, 6) in rad of it."""
-
-    arm: SerialArm
-    number: int
-    joints: Array
-    architecture: Architecture
-    settings: Stopping
-    seed: int
-
-
 def prepare_poses(
-    *,
-    arm: SerialArm,
-    architecture: Architecture,
-    seed: int,
-    trainer: Stopping,
-    poses: Path,
+    *, arm: SerialArm, architecture: Architecture, seed: int, trainer: Stopping, poses: Path
 ) -> Work:
     """One network an arm configuration, in the order of their numbers."""
     found = read_table(poses, POSE_FIELDS)
     items = [
-        WorkspaceItem(
-            arm,
-            number,
-            array(found[found[CONFIGURATION.name] == number], JOINT_FIELDS),
-            architecture,
-            trainer,
-            seed,
-        )
-        for number in range(N_CONFIGURATIONS)
+        (workspace_lesson(arm, array(rows, JOINT_FIELDS), architecture, trainer, seed), number)
+        for number, rows in found.groupby(CONFIGURATION.name)
     ]
 
     def finish(results: list[Columns]) -> Mapping[str, Writer]:
@@ -216,18 +192,24 @@ def prepare_poses(
     return Work(train_workspace, items, finish)
 
 
-def train_workspace(item: WorkspaceItem) -> Columns:
-    """The network from poses to what stands for the joints, packed."""
-    lesson = Lesson(
-        pose_inputs(forward(item.arm, item.joints)),
-        joint_outputs(item.arm, canonical(item.arm, item.joints)),
+def workspace_lesson(
+    arm: SerialArm, joints: Array, architecture: Architecture, settings: Stopping, seed: int
+) -> Lesson:
+    """From poses at `joints` (n, 6), rad, to what stands for the joints."""
+    return Lesson(
+        pose_inputs(forward(arm, joints)),
+        joint_outputs(arm, canonical(arm, joints)),
         [Quantity(*column) for column in INPUTS],
         [Quantity(*column) for column in OUTPUTS],
-        item.architecture,
-        item.settings,
-        item.seed,
+        architecture,
+        settings,
+        seed,
     )
-    return packed(*train(lesson, item.number))
+
+
+def train_workspace(item: tuple[Lesson, int]) -> Columns:
+    """The network of an arm configuration, packed; its number tells the start apart."""
+    return packed(*train(*item))
 
 
 def trained(arrays: Columns) -> tuple[Network, TrainingRecord]:
