@@ -47,7 +47,7 @@ class Select(Model):
     The smallest size within the share `tolerance` of the least selection error is chosen.
     """
 
-    n_restarts: Count = 4
+    n_restarts: Count = 3
     tolerance: NotNegative = 0.0
     trainer: Name = "study"
 
