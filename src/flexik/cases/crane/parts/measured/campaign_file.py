@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from flexik.cases.crane.parts.measured.errors import REFERENCE_METHOD, REFERENCE_PAYLOAD
 from flexik.cases.crane.parts.measured.fields import CAMPAIGN, MEASURED, METHODS, STROKES, TARGET
@@ -27,6 +28,7 @@ LARGEST_PAYLOAD = 1e5  # kg
 LARGEST_ERROR = 0.5  # m
 # a sensor may say a little beyond the ends of its cylinder, m
 STROKE_TOLERANCE = 0.01
+POINT = "({target_x:g}, {target_y:g})"
 
 
 def read_campaign(path: Path | str) -> pd.DataFrame:
@@ -72,23 +74,20 @@ def read_campaign(path: Path | str) -> pd.DataFrame:
                 f"{path}, line {number}: expected {len(names)} cells separated by commas, as in "
                 f"line {first}, got {len(cells)}"
             )
-    numbers = [number for number, _ in rows]
-    texts = pd.DataFrame([cells for _, cells in rows], columns=pd.Index(names), index=numbers)
-    if "method" in names:
-        _check_methods(path, texts["method"])
-    frame = pd.DataFrame(
-        {
-            _without_unit(name): texts[name]
-            if name == "method"
-            else _numbers(path, name, texts[name])
-            for name in COLUMNS
-            if name in names
-        }
-    )
-    if "method" in frame:
-        _check_positioning(path, frame)
-    _check_repeated(path, frame, list(frame.columns))
-    return frame.reset_index(names="line")
+    table = pd.DataFrame([cells for _, cells in rows], columns=pd.Index(names))
+    table.insert(0, "line", [number for number, _ in rows])
+    if "method" in table:
+        message = f"column method: expected one of {list(METHODS)}, got {{method!r}}"
+        _expect(path, table, table["method"].isin(METHODS), message)
+    found = table[["line", *(name for name in COLUMNS if name in names)]].copy()
+    for name in names:
+        if name != "method":
+            found[name] = _numbers(path, table[["line", name]], name)
+    found = found.rename(columns=_without_unit)
+    if "method" in found:
+        _check_positioning(path, found)
+    _check_repeated(path, found, list(found.columns[1:]))
+    return found
 
 
 def own_campaign(file: Path | str, geometry: CraneGeometry) -> pd.DataFrame:
@@ -100,16 +99,25 @@ def own_campaign(file: Path | str, geometry: CraneGeometry) -> pd.DataFrame:
     """
     table = read_campaign(file)
     if "method" in table:
-        missed = np.isnan(smallest_extension(geometry, table[TARGET].to_numpy()))
-        if missed.any():
-            line, x, y = table.loc[missed, ["line", *TARGET]].iloc[0]
-            raise DataError(
-                f"{file}, line {line:g}: the rigid crane does not reach the target ({x:g}, {y:g}) m"
-            )
+        reached = np.isfinite(smallest_extension(geometry, table[TARGET].to_numpy()))
+        _expect(file, table, reached, f"the rigid crane does not reach the target {POINT} m")
     if STROKES[0] in table:
-        _check_strokes(file, table, geometry)
+        for name, longest in zip(STROKES, geometry.stroke_maximum, strict=True):
+            inside = table[name].between(-STROKE_TOLERANCE, longest + STROKE_TOLERANCE)
+            message = f"{name} {{{name}:g}} m, expected 0 to {longest:g} m"
+            _expect(file, table, inside, message)
+        strokes = np.clip(table[STROKES].to_numpy(), 0.0, geometry.stroke_maximum)
+        where = "where these strokes put the rigid crane"
+        _check_near(file, table, forward(geometry, strokes), where)
     missing = (field for field in CAMPAIGN if field.name not in table)
     return table.assign(**{f.name: "" if f.dtype == "string" else np.nan for f in missing})
+
+
+def _expect(path: Path | str, table: pd.DataFrame, good: ArrayLike, message: str) -> None:
+    """Raise DataError at the first row that is not `good`; its cells are put into `message`."""
+    if not (rows := np.asarray(good, dtype=bool)).all():
+        row = {str(name): table[name].iloc[int(np.argmin(rows))] for name in table}
+        raise DataError(f"{path}, line {row['line']}: {message.format(**row)}")
 
 
 def _split(path: Path | str) -> tuple[tuple[int, list[str]], Rows]:
@@ -156,92 +164,52 @@ def _check_header(path: Path | str, number: int, names: Sequence[str]) -> None:
             )
 
 
-def _check_methods(path: Path | str, methods: pd.Series) -> None:
-    for number, method in methods.items():
-        if method not in METHODS:
-            raise DataError(
-                f"{path}, line {number}, column method: expected one of {list(METHODS)}, "
-                f"got {method!r}"
-            )
-
-
-def _numbers(path: Path | str, name: str, texts: pd.Series) -> pd.Series:
+def _numbers(path: Path | str, table: pd.DataFrame, name: str) -> pd.Series:
     """Finite numbers of the column `name`, within what its unit makes plausible."""
-    load = name.endswith("_kg")
-    low, high = (0.0, LARGEST_PAYLOAD) if load else (-LARGEST_LENGTH, LARGEST_LENGTH)
-    values = []
-    for number, text in texts.items():
-        where = f"{path}, line {number}, column {name}"
+
+    def number(text: str) -> float:
         try:
-            value = float(text)
+            return float("nan" if "_" in text else text)  # float() takes 1_000 too
         except ValueError:
-            value = np.nan
-        # float() takes 1_000 too
-        if not np.isfinite(value) or "_" in text:
-            raise DataError(f"{where}: expected a number, got {text!r}")
-        if not low <= value <= high:
-            unit = "kg" if load else "m"
-            raise DataError(f"{where}: expected {low:g} to {high:g} {unit}, got {text}")
-        values.append(value)
-    return pd.Series(values, index=texts.index, dtype=float)
+            return np.nan
 
-
-def _check_positioning(path: Path | str, frame: pd.DataFrame) -> None:
-    """Raise DataError unless every condition was measured once by both methods, 0 kg among them."""
-    missed = np.hypot(
-        frame["measured_x"] - frame["target_x"], frame["measured_y"] - frame["target_y"]
+    values = table[name].map(number).astype(float)
+    where, load = f"column {name}: expected", name.endswith("_kg")
+    _expect(path, table, np.isfinite(values), f"{where} a number, got {{{name}!r}}")
+    low, high, unit = (
+        (0.0, LARGEST_PAYLOAD, "kg") if load else (-LARGEST_LENGTH, LARGEST_LENGTH, "m")
     )
-    for number, distance in zip(frame.index, missed, strict=True):
-        if distance > LARGEST_ERROR:
-            raise DataError(
-                f"{path}, line {number}: expected a point within {LARGEST_ERROR:g} m of its "
-                f"target, got one {distance:.3g} m away"
-            )
+    message = f"{where} {low:g} to {high:g} {unit}, got {{{name}}}"
+    _expect(path, table, values.between(low, high), message)
+    return values
+
+
+def _check_positioning(path: Path | str, table: pd.DataFrame) -> None:
+    """Raise DataError unless every condition was measured once by both methods, 0 kg among them."""
+    _check_near(path, table, table[TARGET].to_numpy(), "its target")
     keys = ["method", *TARGET, "payload"]
-    _check_repeated(path, frame, keys)
-    known = set(frame[keys].itertuples(index=False, name=None))
-    for number, (method, x, y, payload) in zip(
-        frame.index, frame[keys].itertuples(index=False, name=None), strict=True
-    ):
-        (other,) = set(METHODS) - {method}
-        for needed in ((other, x, y, payload), (REFERENCE_METHOD, x, y, REFERENCE_PAYLOAD)):
-            if needed not in known:
-                what = " (the reference)" if needed[3] == 0 and payload != 0 else ""
-                raise DataError(
-                    f"{path}, line {number}: expected a line with {needed[3]:g} kg and method "
-                    f"{needed[0]!r} for the target ({x:g}, {y:g}) m too{what}"
-                )
+    _check_repeated(path, table, keys)
+    known = set(table[keys].itertuples(index=False, name=None))
+    other = table["method"].map(dict(zip(METHODS, METHODS[::-1], strict=True)))
+    reference = {"method": REFERENCE_METHOD, "payload": REFERENCE_PAYLOAD}
+    for needed, what in (({"method": other}, ""), (reference, " (the reference)")):
+        wanted = table.assign(**needed)
+        there = [row in known for row in wanted[keys].itertuples(index=False, name=None)]
+        line = f"a line with {{payload:g}} kg and method {{method!r}} for the target {POINT} m"
+        _expect(path, wanted, there, f"expected {line} too{what}")
 
 
-def _check_strokes(file: Path | str, table: pd.DataFrame, geometry: CraneGeometry) -> None:
-    for name, longest in zip(STROKES, geometry.stroke_maximum, strict=True):
-        beyond = ~table[name].between(-STROKE_TOLERANCE, longest + STROKE_TOLERANCE)
-        if beyond.any():
-            line, stroke = table.loc[beyond, ["line", name]].iloc[0]
-            raise DataError(
-                f"{file}, line {line:g}: {name} {stroke:g} m, expected 0 to {longest:g} m"
-            )
-    strokes = np.clip(table[STROKES].to_numpy(), 0.0, geometry.stroke_maximum)
-    away = np.linalg.norm(table[MEASURED].to_numpy() - forward(geometry, strokes), axis=1)
-    if (away > LARGEST_ERROR).any():
-        row = int(np.argmax(away > LARGEST_ERROR))
-        raise DataError(
-            f"{file}, line {table['line'].iloc[row]}: expected a point within {LARGEST_ERROR:g} m "
-            f"of where these strokes put the rigid crane, got one {away[row]:.3g} m away"
-        )
+def _check_near(path: Path | str, table: pd.DataFrame, points: ArrayLike, what: str) -> None:
+    """Raise DataError unless each point was measured within LARGEST_ERROR of `points` (n, 2)."""
+    away = np.linalg.norm(table[MEASURED].to_numpy() - points, axis=1)
+    message = f"expected a point within {LARGEST_ERROR:g} m of {what}, got one {{away:.3g}} m away"
+    _expect(path, table.assign(away=away), away <= LARGEST_ERROR, message)
 
 
-def _check_repeated(path: Path | str, frame: pd.DataFrame, keys: list[str]) -> None:
-    first: dict[tuple[object, ...], object] = {}
-    for number, row in zip(
-        frame.index, frame[keys].itertuples(index=False, name=None), strict=True
-    ):
-        if row in first:
-            raise DataError(
-                f"{path}, line {number}: expected each measurement once, but {', '.join(keys)} "
-                f"are those of line {first[row]}"
-            )
-        first[row] = number
+def _check_repeated(path: Path | str, table: pd.DataFrame, keys: list[str]) -> None:
+    first = table.groupby(keys, sort=False)["line"].transform("first")
+    message = f"expected each measurement once, but {', '.join(keys)} are those of line {{first}}"
+    _expect(path, table.assign(first=first), first == table["line"], message)
 
 
 def _without_unit(name: str) -> str:
