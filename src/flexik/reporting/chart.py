@@ -138,20 +138,13 @@ def chart(
     hues = {value: None for layer in layers if layer.hue for value in layer.frame[layer.hue]}
     looks = {**style.looks(hues), **(looks or {})}
     for axes, name in zip(grid.ravel(), names, strict=False):
-        inside = [(la, _inside(la, panel, name)) for la in layers]
-        axes_of = [a if isinstance(a, Axis) else a[name] for a in (x, y)]
-        # one axis of all panels begins where all of their data does
-        every = [(la, la.frame) for la in layers]
-        seen = [every if isinstance(a, Axis) else inside for a in (x, y)]
-        least = [_least(drawn, which) for drawn, which in zip(seen, "xy", strict=True)]
-        for layer, frame in inside:
-            _draw(axes, layer, frame, axes_of, least, looks)
+        _panel(axes, layers, panel, name, (x, y), looks)
         for rule in rules:
             if rule.panel in (None, name):
                 line = axes.axvline if rule.axis == "x" else axes.axhline
                 line(rule.value, label=rule.label or None, zorder=1.6, **rule.look)
-        title = titles if isinstance(titles, str) else titles.get(name, str(name))
-        title = str(name) if panel is not None and titles == "" else title
+        of_name = {None: titles} if isinstance(titles, str) else titles
+        title = of_name.get(name, "" if name is None else str(name))
         lines = (textwrap.fill(line, CHARACTERS // columns) for line in title.splitlines())
         axes.set(title="\n".join(lines), **({"aspect": "equal"} if equal else {}))
     _set_all(figure, grid, names, (x, y), share)
@@ -176,6 +169,25 @@ def _values(layers: Iterable[Layer], column: str) -> list[Any]:
 def _inside(layer: Layer, panel: str | None, name: Any) -> pd.DataFrame:
     everywhere = panel is None or panel not in layer.frame
     return layer.frame if everywhere else layer.frame[layer.frame[panel] == name]
+
+
+def _panel(
+    axes: Axes,
+    layers: Sequence[Layer],
+    panel: str | None,
+    name: Any,
+    both: Sequence[Axis | Mapping[Any, Axis]],
+    looks: Mapping[Any, Look],
+) -> None:
+    """Draw what is in the panel `name`."""
+    inside = [(layer, _inside(layer, panel, name)) for layer in layers]
+    # one axis of all panels begins where all of their data does
+    every = [(layer, layer.frame) for layer in layers]
+    seen = [every if isinstance(a, Axis) else inside for a in both]
+    least = [_least(drawn, which) for drawn, which in zip(seen, "xy", strict=True)]
+    axes_of = [a if isinstance(a, Axis) else a[name] for a in both]
+    for layer, frame in inside:
+        _draw(axes, layer, frame, axes_of, least, looks)
 
 
 def _least(drawn: Iterable[tuple[Layer, pd.DataFrame]], which: str) -> float:
