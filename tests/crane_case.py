@@ -4,8 +4,10 @@ import contextlib
 import functools
 from pathlib import Path
 
+import pandas as pd
+
 from flexik.cases.case import load
-from flexik.kinematics.crane_manipulator import CraneManipulator, geometry_of
+from flexik.cases.crane.parts.fields import SAMPLE_FIELDS
 from flexik.multibody.crane.assembly import flexible_crane
 
 ROOT = Path(__file__).parents[1]
@@ -26,4 +28,6 @@ def crane(stiffness=SPRING):
         return flexible_crane(section().machine, stiffness)
 
 
-MANIPULATOR = CraneManipulator(geometry_of(section().machine))
+def samples(columns):
+    """Table of samples with the `columns` of SAMPLE_FIELDS."""
+    return pd.DataFrame({f.name: column for f, column in zip(SAMPLE_FIELDS, columns, strict=True)})

@@ -5,6 +5,7 @@ import sys
 from dataclasses import dataclass
 from itertools import pairwise
 
+import crane_case
 import numpy as np
 import pytest
 from elastic_arm import GEOMETRY as ARM
@@ -115,54 +116,81 @@ def settings(name, **given):
     return TypeAdapter(Methods).validate_python({"it": {"method": name, **given}})["it"]
 
 
-@pytest.mark.parametrize("name", METHODS)
-@pytest.mark.parametrize("machine", ["crane", "arm"])
-def test_every_method_answers_for_every_machine(crane, machine, name):
-    manipulator = {"crane": crane, "arm": ARM}[machine]
-    chosen = settings(name)
-    network = network_for(chosen.needs, manipulator)
-    method = build_of(chosen)(chosen, Ingredients(manipulator, network))
-    generator = np.random.default_rng(5)
+@dataclass(frozen=True)
+class Asked:
+    """A method of a machine and its answers to 20 queries, of which row 3 is out of reach."""
+
+    manipulator: object
+    network: object
+    method: object
+    query: np.ndarray
+    current: np.ndarray
+    answer: Answer
+
+
+@pytest.fixture(params=["crane", "arm"])
+def asked(crane, name, request):
+    manipulator = {"crane": crane, "arm": ARM}[request.param]
     low, high = manipulator.lower, manipulator.upper
+    generator = np.random.default_rng(5)
     inside = low + generator.uniform(0.55, 0.75, (20, len(low))) * (high - low)
     payload = generator.uniform(0.0, 100.0, 20)
-    target = (
-        network.predict(np.column_stack([inside, payload]))
-        if isinstance(network, Network)
-        else manipulator.forward(inside)
-    )
-    query = np.column_stack([target, payload])
-    query[3, :2] = 50.0  # nothing reaches there
+    chosen, tip = settings(name), manipulator.forward(inside)
+    samples = {}
+    if request.param == "crane":
+        columns = [*inside.T, payload, *tip.T, *tip.T, np.zeros(20)]
+        samples["grid"] = crane_case.samples(columns)
+    if not set(chosen.reads) <= samples.keys():
+        pytest.skip(f"{request.param} has no samples {chosen.reads}")
+    network = network_for(chosen.needs, manipulator)
+    if isinstance(network, Network):
+        tip = network.predict(np.column_stack([inside, payload]))
+    query = np.column_stack([tip, payload])
+    query[3, :2] = 50.0
     current = inside + 0.01 * (high - low)
     before = query.copy(), current.copy()
+    method = build_of(chosen)(chosen, Ingredients(manipulator, network, samples))
     answer = method(query, current)
-    assert answer.values.shape == current.shape
-    assert ((answer.values >= low) & (answer.values <= high)).all()
-    assert set(answer.status) <= set(STATUS_MEANING)
-    reached = np.arange(20) != 3
-    assert ((answer.status == REACHED) == reached).all()
-    # an exact network, within what the method itself leaves
-    if isinstance(network, Network):
-        found = network.predict(np.column_stack([answer.values, payload]))
-    else:
-        found = manipulator.forward(answer.values)
-        if name == "combined":
-            found += network.predict(np.column_stack([answer.values, payload]))
-    assert found[reached] == pytest.approx(target[reached], abs=3e-3)
-    if not isinstance(network, Network):
-        assert np.array_equal(answer.values[3], current[3])
-    # rows do not influence each other, and nothing of what was given has changed
-    some = np.array([4, 3, 11])
-    assert method(query[some], current[some]).values == pytest.approx(answer.values[some], abs=1e-9)
     assert np.array_equal(query, before[0]) and np.array_equal(current, before[1])
-    assert method(query[:0], current[:0]).values.shape == (0, len(low))
+    return Asked(manipulator, network, method, query, current, answer)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_answers_for_every_machine(asked, name):
+    low, high, values = asked.manipulator.lower, asked.manipulator.upper, asked.answer.values
+    assert values.shape == asked.current.shape
+    assert ((values >= low) & (values <= high)).all()
+    assert set(asked.answer.status) <= set(STATUS_MEANING)
+    # rows do not influence each other
+    some = np.array([4, 3, 11])
+    alone = asked.method(asked.query[some], asked.current[some])
+    assert alone.values == pytest.approx(values[some], abs=1e-9)
+    assert np.array_equal(alone.status, asked.answer.status[some])
+    assert asked.method(asked.query[:0], asked.current[:0]).values.shape == (0, len(low))
     with pytest.raises(PositioningError, match="query: expected shape"):
-        method(query[:, :2], current)
+        asked.method(asked.query[:, :2], asked.current)
+
+
+@pytest.mark.parametrize("name", ["none", "combined", "direct", "modular", "inverse"])
+def test_with_an_exact_network_a_method_reaches_what_can_be_reached(asked, name):
+    reached = np.arange(20) != 3
+    assert ((asked.answer.status == REACHED) == reached).all()
+    values, network = asked.answer.values, asked.network
+    inputs = np.column_stack([values, asked.query[:, 2]])
+    if isinstance(network, Network):
+        found = network.predict(inputs)
+    else:
+        found = asked.manipulator.forward(values)
+        assert np.array_equal(values[3], asked.current[3])
+    if name == "combined":
+        found += network.predict(inputs)
+    assert found[reached] == pytest.approx(asked.query[reached, :2], abs=3e-3)
     with pytest.raises(PositioningError, match="current coordinates: expected shape"):
-        method(query, current[:, :1])
+        asked.method(asked.query, asked.current[:, :1])
+    chosen = settings(name)
     if chosen.needs is not None:
         with pytest.raises(PositioningError, match="needs a network"):
-            build_of(chosen)(chosen, Ingredients(manipulator))
+            build_of(chosen)(chosen, Ingredients(asked.manipulator))
 
 
 def errors(method, query, current, sag):
