@@ -26,8 +26,7 @@ from threadpoolctl import threadpool_limits
 from flexik import stage
 from flexik.cases.case import load
 from flexik.cases.fanuc.parts import evaluate
-from flexik.cases.fanuc.parts.samples import arm_of
-from flexik.cases.fanuc.parts.tables import JOINT_FIELDS, POSE_FIELDS, QUERY_FIELDS, array
+from flexik.cases.fanuc.parts.tables import JOINT_FIELDS, POSE_FIELDS, QUERY_FIELDS, arm_of, array
 from flexik.cases.fanuc.parts.train import workspace_lesson
 from flexik.cases.fanuc.report_results import growth_settings, judged, label, query_settings
 from flexik.cases.fanuc.section import WHOLE, Section

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from fanuc_arm import ARM, FILES, SECTION, section
 
-from flexik.cases.fanuc.parts.samples import arm_of
+from flexik.cases.fanuc.parts.tables import arm_of
 from flexik.cases.fanuc.section import N_INPUTS, N_OUTPUTS, check, n_weights
 from flexik.errors import ParameterError
 from flexik.kinematics.pose_representation import INPUTS, OUTPUTS

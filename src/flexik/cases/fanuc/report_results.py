@@ -10,12 +10,12 @@ import pandas as pd
 
 from flexik.cases.fanuc.parts import evaluate
 from flexik.cases.fanuc.parts.learning import percent
-from flexik.cases.fanuc.parts.samples import arm_of
 from flexik.cases.fanuc.parts.tables import (
     COMMANDED_FIELDS,
     JOINT_FIELDS,
     PATH_FIELDS,
     QUERY_FIELDS,
+    arm_of,
     array,
 )
 from flexik.cases.fanuc.section import PUBLISHED_NETWORKS, Section, Success

@@ -273,7 +273,8 @@ def check_entries(key: str, values: list[float] | list[int]) -> None:
 
 def check(section: Section) -> None:
     """Raise ParameterError unless the closed form fits the arm and the path keeps its limits."""
-    from flexik.cases.fanuc.parts.samples import arm_of, taught_path
+    from flexik.cases.fanuc.parts.samples import taught_path
+    from flexik.cases.fanuc.parts.tables import arm_of
     from flexik.kinematics.spherical_wrist import check_spherical_wrist
 
     try:

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.cases.fanuc.parts.samples import arm_of
 from flexik.cases.fanuc.parts.tables import (
     COMMANDED_FIELDS,
     ERROR_FIELDS,
@@ -17,6 +16,7 @@ from flexik.cases.fanuc.parts.tables import (
     QUERY_FIELDS,
     START_ERRORS,
     STEPS,
+    arm_of,
     array,
 )
 from flexik.cases.fanuc.section import CONDITIONS, EXACT, LOOKED_UP, WHOLE, Refinement, Section

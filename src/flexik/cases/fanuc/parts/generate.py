@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from flexik.cases.fanuc.parts.samples import arm_of, beside, random_joints, taught_path
+from flexik.cases.fanuc.parts.samples import beside, random_joints, taught_path
 from flexik.cases.fanuc.parts.tables import (
     CONFIGURATION,
     JOINT_FIELDS,
@@ -16,6 +16,7 @@ from flexik.cases.fanuc.parts.tables import (
     POSITION_FIELDS,
     QUERY_FIELDS,
     RANDOM_FIELDS,
+    arm_of,
     array,
     named,
 )

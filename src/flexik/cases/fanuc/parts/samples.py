@@ -1,13 +1,12 @@
 """The taught path, targets beside it, and random poses of every arm configuration."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from flexik.cases.fanuc.section import Joint, Path
+from flexik.cases.fanuc.section import Path
 from flexik.errors import ParameterError
 from flexik.kinematics.serial_arm import Array, Pose, SerialArm
 from flexik.kinematics.spherical_wrist import admissible, canonical, configuration
@@ -18,11 +17,6 @@ _DRAW, _MAXIMUM_DRAWN = 50_000, 20_000_000
 # Directions tried for a target beside the path, and the share by which its distance from the path
 # may fall short: the path is known by straight segments
 _DIRECTIONS, SHORTER = 20, 0.01
-
-
-def arm_of(joints: Sequence[Joint]) -> SerialArm:
-    """The arm of the machine file."""
-    return SerialArm.from_rows([joint.model_dump() for joint in joints])
 
 
 class TaughtPath(NamedTuple):

@@ -1,13 +1,14 @@
-"""Columns of the tables of the six-joint arm."""
+"""The six-joint arm, and the columns of its tables."""
 
 from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 
+from flexik.cases.fanuc.section import Joint
 from flexik.datasets.tables import Field
 from flexik.kinematics.pose_representation import INPUTS
-from flexik.kinematics.serial_arm import Array
+from flexik.kinematics.serial_arm import Array, SerialArm
 
 JOINT_FIELDS = tuple(Field(f"joint_{k}", "rad", "joint angle") for k in range(1, 7))
 COMMANDED_FIELDS = tuple(
@@ -74,6 +75,11 @@ STUDY_FIELDS = (
     Field("kept", "1", "pass with the least training error, whose weights are kept", "int64"),
     Field("stop_reason", "1", "why the training ended", "string"),
 )
+
+
+def arm_of(joints: Sequence[Joint]) -> SerialArm:
+    """The arm of the machine file."""
+    return SerialArm.from_rows([joint.model_dump() for joint in joints])
 
 
 def named(fields: Sequence[Field], values: Array) -> dict[str, Array]:

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from flexik.cases.fanuc.parts.learning import Run, TaughtSamples, learn, percent, side_by_side
-from flexik.cases.fanuc.parts.samples import arm_of
 from flexik.cases.fanuc.parts.tables import (
     CONFIGURATION,
     CURVE_FIELDS,
@@ -16,6 +15,7 @@ from flexik.cases.fanuc.parts.tables import (
     PATH_FIELDS,
     POSE_FIELDS,
     START_FIELDS,
+    arm_of,
     array,
 )
 from flexik.cases.fanuc.section import N_JOINTS, Section
