@@ -3,8 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 # What pyproject.toml asks for, with the extras named, in the versions of constraints.txt. flexik itself
 # is not installed: a stage runs the src beside it, also in a copy of the project that DVC makes.
-# PyPI's torch for Linux brings CUDA, several GB that nothing here uses; without it:
-# PIP_EXTRA_INDEX_URL=https://download.pytorch.org/whl/cpu make setup
+# torch for Linux brings CUDA, several GB that nothing here uses, where pip finds no CPU build of it.
 ASKED = $(BIN)/python -c 'import sys, tomllib; \
   project = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
   print(*project["dependencies"], *sum((project["optional-dependencies"][e] for e in sys.argv[1:]), []))'

@@ -4,11 +4,16 @@ import shutil
 import subprocess
 import sys
 
-import numpy as np
 import pytest
-from smoke_pipeline import ROOT, environment
 
-from flexik.kinematics.crane import CraneGeometry
+from flexik import kernels
+
+kernels.fix()  # as the stages do, before NumPy is imported
+
+import numpy as np  # noqa: E402
+from smoke_pipeline import ROOT, environment  # noqa: E402
+
+from flexik.kinematics.crane import CraneGeometry  # noqa: E402
 
 
 @pytest.fixture(scope="session")
