@@ -77,7 +77,7 @@ def rows(*fields: Field) -> Callable[[list[Columns]], Mapping[str, Writer]]:
 
 
 def stacked(results: Sequence[Columns], fields: Sequence[Field]) -> dict[str, np.ndarray]:
-    """Columns `fields` of all `results`, one below the other; raises DataError if one is missing."""
+    """Columns `fields` of all `results`, one below the other; DataError if one is missing."""
     for result in results:
         if missing := [f.name for f in fields if f.name not in result]:
             raise DataError(f"expected columns {[f.name for f in fields]}, but {missing} missing")
