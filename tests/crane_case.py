@@ -8,6 +8,7 @@ import pandas as pd
 
 from flexik.cases.case import load
 from flexik.cases.crane.parts.fields import SAMPLE_FIELDS
+from flexik.kinematics.crane_manipulator import CraneManipulator, geometry_of
 from flexik.multibody.crane.assembly import flexible_crane
 
 ROOT = Path(__file__).parents[1]
@@ -31,3 +32,6 @@ def crane(stiffness=SPRING):
 def samples(columns):
     """Table of samples with the `columns` of SAMPLE_FIELDS."""
     return pd.DataFrame({f.name: column for f, column in zip(SAMPLE_FIELDS, columns, strict=True)})
+
+
+MANIPULATOR = CraneManipulator(geometry_of(section().machine))
