@@ -101,19 +101,6 @@ def test_a_learning_factor_that_does_not_stay_is_told():
         section(changed(PARAMETERS, "trainers.delta_rule.rate_increase", 1.1))
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "what"),
-    [
-        ("joints.4.d", 0.1, "fanuc.yaml: joints: the closed form needs d5 = 0, got 0.1"),
-        ("joints.0.alpha", 1.0, "fanuc.yaml: joints: the closed form needs alpha1"),
-        ("joints.3.minimum", -0.9, "params.yaml: fanuc.samples.path.region.3"),
-    ],
-)
-def test_an_arm_that_does_not_fit_is_told(key, value, what):
-    with pytest.raises(ParameterError, match=what):
-        check(section(PARAMETERS, changed(MACHINE, key, value)))
-
-
 def test_weights_are_counted_as_networks_have_them():
     n_inputs, n_outputs = N_INPUTS["arm_configuration"], N_OUTPUTS["arm_configuration"]
     assert (len(INPUTS), len(OUTPUTS)) == (n_inputs, n_outputs)
