@@ -10,14 +10,12 @@ ASKED = $(BIN)/python -c 'import sys, tomllib; \
 INSTALL = @echo "installing the packages of pyproject.toml $(1)"; \
   $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt $$($(ASKED) $(1))
 
-# one BLAS thread a process: these matrices are small, the processes are what runs in parallel
-export OMP_NUM_THREADS := 1
-export OPENBLAS_NUM_THREADS := 1
-export MKL_NUM_THREADS := 1
+BENCHMARKS := benchmark benchmark-training benchmark-positioning benchmark-fanuc benchmark-smartee
+
 export DVC_NO_ANALYTICS := 1
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: help repro smoke test lint lock benchmark benchmark-training benchmark-positioning benchmark-fanuc benchmark-smartee setup clean
+.PHONY: help repro smoke test lint lock $(BENCHMARKS) setup clean
 .NOTPARALLEL:
 
 help: ## this list
@@ -42,7 +40,11 @@ lock: $(VENV)/.pipeline ## after a merge that left conflicts in dvc.lock or repo
 	$(BIN)/dvc repro
 	git add dvc.lock reports
 
-benchmark benchmark-training benchmark-positioning benchmark-fanuc benchmark-smartee: export PYTHONPATH := src
+$(BENCHMARKS): export PYTHONPATH := src
+# one thread a process, as the stages have; the threads of torch and JAX too
+$(BENCHMARKS): export OMP_NUM_THREADS := 1
+$(BENCHMARKS): export OPENBLAS_NUM_THREADS := 1
+$(BENCHMARKS): export MKL_NUM_THREADS := 1
 
 benchmark: $(VENV)/.dev ## timings of the generation beside other ways; writes reports/benchmarks/
 	$(BIN)/python benchmarks/generate.py
