@@ -3,9 +3,10 @@
 A case NAME is the section NAME of params.yaml, the machine data/machines/NAME.yaml and the folder
 flexik/cases/NAME:
 
-    section.py    `Section`, the validated section (its `machine` is the validated machine file, its
-                  `trainers` are the named ones of params.yaml), and `check(section)`, which finds
-                  what no single value tells: a linkage that does not close, a target out of reach
+    section.py    `Section`, the validated section, a parameters.section.CaseSection (its `machine`
+                  is the validated machine file, its `trainers` are the named ones of params.yaml),
+                  and `check(section)`, which finds what no single value tells: a linkage that does
+                  not close, a target out of reach
     parts/STAGE.py `parts(section)`, the parts of the stage (datasets.parts); a module for each of
                   the STAGES the case has
     report.py     `report(section)`, which writes reports/NAME from data/NAME
@@ -116,6 +117,7 @@ def _section(name: str, data: Mapping[str, Any], file: str) -> Any:
         raise ParameterError(f"{file}: {name}: expected a mapping of keys to values")
     whole = {
         **data[name],
+        "name": name,
         "machine": _read(machine),
         "trainers": data.get("trainers", {}),
     }

@@ -16,7 +16,7 @@ from flexik.multibody.beams import read_section
 from flexik.parameters.conditions import ConditionSet, Points, RandomTargets, check_different
 from flexik.parameters.model import Count, Model, Name, NotNegative, Positive, Seed, Share
 from flexik.parameters.networks import Axis, Network, check_networks
-from flexik.parameters.trainers import Trainer
+from flexik.parameters.section import CaseSection
 from flexik.positioning.combined import Settings as Combined
 from flexik.positioning.inverted_network import InvertedSettings
 from flexik.positioning.registry import Methods, check_methods
@@ -141,12 +141,11 @@ class Studies(Model):
     measured: Measured
 
 
-class Section(Model):
+class Section(CaseSection):
     """The log crane."""
 
     machine: Machine
-    trainers: dict[Name, Trainer]
-    calibration: Calibration = Calibration()
+    calibration: Calibration = Calibration()  # type: ignore[assignment]
     samples: Samples
     networks: Annotated[dict[Name, CraneNetwork], Field(min_length=1)]
     conditions: dict[Name, ConditionSet]

@@ -19,7 +19,7 @@ from flexik.parameters.model import (
 )
 from flexik.parameters.networks import Axis, check_networks
 from flexik.parameters.networks import Network as AnyNetwork
-from flexik.parameters.trainers import Trainer
+from flexik.parameters.section import CaseSection
 from flexik.positioning import method, registry
 
 Pair = tuple[Positive, Positive]
@@ -220,12 +220,10 @@ class Studies(Model):
     payload_error: Positive
 
 
-class Section(Model):
+class Section(CaseSection):
     """The elastic two-link arm."""
 
-    calibration: None = None
     machine: Machine
-    trainers: dict[Name, Trainer]
     samples: Samples
     networks: dict[Name, Network]
     conditions: Annotated[dict[Name, RandomTargets], Field(min_length=1)]

@@ -8,7 +8,8 @@ from pydantic import Field, model_validator
 from flexik.errors import ParameterError
 from flexik.parameters.model import Count, Interval, Model, Name, NotNegative, Positive, Seed
 from flexik.parameters.networks import Network, check_networks
-from flexik.parameters.trainers import BackPropagation, Trainer
+from flexik.parameters.section import CaseSection
+from flexik.parameters.trainers import BackPropagation
 
 # Columns: position; pose and what stands for joints, see kinematics.pose_representation
 N_INPUTS = {"each_joint": 3, "all_joints": 3, "arm_configuration": 12}
@@ -146,12 +147,10 @@ class Success(Model):
     orientation: Positive
 
 
-class Section(Model):
+class Section(CaseSection):
     """The six-joint arm."""
 
-    calibration: None = None
     machine: Machine
-    trainers: dict[Name, Trainer]
     samples: Samples
     networks: dict[Name, Network]
     conditions: Conditions

@@ -8,7 +8,8 @@ from pydantic import Field, model_validator
 from flexik.files import checksum
 from flexik.parameters.model import Count, Model, Name, Positive, Seed
 from flexik.parameters.networks import Network, Sizes, check_networks
-from flexik.parameters.trainers import RegularisedCg, Trainer
+from flexik.parameters.section import CaseSection
+from flexik.parameters.trainers import RegularisedCg
 
 Names = Annotated[list[Name], Field(min_length=1)]
 # More is a slip of the pen, and more than memory holds
@@ -186,12 +187,10 @@ class Studies(Model):
     geometries: dict[Name, Geometry]
 
 
-class Section(Model):
+class Section(CaseSection):
     """The parallel manipulator."""
 
-    calibration: None = None
     machine: Machine
-    trainers: dict[Name, Trainer]
     samples: Samples
     networks: dict[Name, Network]
     conditions: dict[Name, Poses]
