@@ -12,7 +12,7 @@ import statistics
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -143,6 +143,7 @@ def grow(section: Section, arm: SerialArm) -> pd.DataFrame:
         settings = section.trainers[network.trainer].but(n_iterations=n_iterations)
         architecture = Architecture(n_hidden, network.activation)
         lesson = workspace_lesson(arm, joints, architecture, settings, network.seed)
+        train(replace(lesson, settings=settings.but(n_iterations=1)))  # imports, first calls
         started = time.process_time()
         found, _ = train(lesson)
         seconds = time.process_time() - started

@@ -53,7 +53,7 @@ def metrics(results: Results) -> dict[str, float | None]:
         means = results.start_means[name].dropna()
         found[f"{name}.least_mean_error_percent"] = means.min()
         found[f"{name}.largest_mean_error_percent"] = means.max()
-        shifts = MM * having(results.start_errors, network=name)["mean_error"]
+        shifts = MM * results.start_shifts[name]
         found[f"{name}.least_mean_position_error_mm"] = shifts.min()
         found[f"{name}.largest_mean_position_error_mm"] = shifts.max()
     for where in ("path", "random_poses"):
@@ -193,6 +193,7 @@ def off_path(results: Results) -> dict[str, Any]:
     means = having(frame, n_steps=0).groupby(["method", "distance"])["error"].mean()
     best = {d: min(means[name, d] for name in LOOKED_UP) for d in there}
     last = results.n_steps
+    ends = having(results.start_errors, conditions="off_path", n_steps=last)
     return {
         "left_out": {d: n_test - counts.get(d, 0) for d in distances if counts.get(d, 0) < n_test},
         "distances": there,
@@ -206,6 +207,12 @@ def off_path(results: Results) -> dict[str, Any]:
         "reach": {
             label(name, last): _reach(having(frame, method=name, n_steps=last))
             for name in (*section.path_methods, WHOLE)
+        },
+        "reach_of_starts": {
+            label(name, last): [
+                _reach(rows) for _, rows in having(ends, method=name).groupby("restart")
+            ]
+            for name in results.networks
         },
     }
 

@@ -39,7 +39,8 @@ class Results:
     """Tables of the stages (SI units), published values and timings.
 
     path : samples of the taught path
-    starts, curves, start_errors : of all networks of the path, with a column `network`
+    starts, curves : of all networks of the path, with a column `network`
+    start_errors : as `errors`, of all starts of the networks of the path, with a column `restart`
     studies : by what was varied
     errors : all methods on all conditions; columns conditions, method, label (the method with its
         Newton steps), reached, met (as reached, in whatever configuration), those of the errors,
@@ -106,6 +107,12 @@ class Results:
             for conditions, rows in self.errors.groupby("conditions", sort=False)
         }
 
+    @cached_property
+    def start_shifts(self) -> pd.Series:
+        """Mean position error on the path, m, by network and start."""
+        rows = having(self.start_errors, conditions="path")
+        return rows.groupby(["method", "restart"], sort=False)["error"].mean()
+
     def of(self, conditions: str) -> pd.DataFrame:
         """Rows of `errors` of some conditions, without columns of others."""
         rows = having(self.errors, conditions=conditions)
@@ -156,15 +163,16 @@ def read(section: Section) -> Results:
     """All of it; raises DataError if something is missing, damaged or impossible."""
     tables = {
         kind: pd.concat(
-            read_table(folder / f"{name}.{kind}.parquet").assign(network=name)
+            read_table(DATA / f"networks/{name}.{kind}.parquet").assign(network=name)
             for name in section.path_networks
         )
-        for kind, folder in (
-            ("starts", DATA / "networks"),
-            ("curves", DATA / "networks"),
-            ("start_errors", DATA / "errors/path"),
-        )
+        for kind in ("starts", "curves")
     }
+    start_errors = [
+        _errors(section, f"{where}/{name}", ".starts")
+        for where in ("path", "off_path")
+        for name in section.path_networks
+    ]
     studies = {
         name: read_table(DATA / f"studies/{name}.parquet")
         for name in type(section.studies).model_fields
@@ -175,6 +183,7 @@ def read(section: Section) -> Results:
         section=section,
         path=read_table(DATA / "samples/path.parquet", PATH_FIELDS),
         **tables,
+        start_errors=pd.concat(start_errors, ignore_index=True),
         studies=studies,
         errors=pd.concat(
             [_errors(section, part.name) for part in evaluate.parts(section)], ignore_index=True
@@ -185,13 +194,15 @@ def read(section: Section) -> Results:
     )
 
 
-def _errors(section: Section, part: str) -> pd.DataFrame:
-    """Rows of Results.errors of the part "CONDITIONS/METHOD"."""
+def _errors(section: Section, part: str, kind: str = "") -> pd.DataFrame:
+    """Rows of Results.errors of the part "CONDITIONS/METHOD"; of all starts: `kind` ".starts"."""
     conditions, method = part.split("/")
     queries = [field.name for field in QUERY_FIELDS]
     asked = read_table(DATA / f"samples/conditions/{conditions}.parquet")
-    found = read_table(DATA / f"errors/{part}.parquet").drop(columns=queries)
-    found = found.join(asked.drop(columns=queries), on="point")
+    found = read_table(DATA / f"errors/{part}{kind}.parquet")
+    found = found.drop(columns=queries, errors="ignore").join(
+        asked.drop(columns=queries), on="point"
+    )
     labels = found["n_steps"].map(lambda n_steps: label(method, n_steps))
     named = found.assign(conditions=conditions, method=method, label=labels)
     return judged(named, section.success)

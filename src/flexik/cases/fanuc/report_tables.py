@@ -54,7 +54,7 @@ def tables(results: Results) -> dict[str, Table]:
     on_path, at_random = (
         results.statistics[where].reset_index() for where in ("path", "random_poses")
     )
-    starts = results.start_errors.groupby("network")["mean_error"].agg(["min", "max"])
+    starts = results.start_shifts.groupby("method").agg(["min", "max"])
     spreads = {n: f"{MM * least:.3g} to {MM * most:.3g}" for n, least, most in starts.itertuples()}
     on_path["starts"] = on_path["label"].map(spreads).fillna("")
     times = results.times.rename(columns={"method": "label"})

@@ -14,7 +14,7 @@ from flexik.cases.fanuc.parts.tables import (
     PATH_FIELDS,
     POSITION_FIELDS,
     QUERY_FIELDS,
-    START_ERRORS,
+    RESTART,
     STEPS,
     arm_of,
     array,
@@ -39,6 +39,7 @@ from flexik.positioning.refined import Refined
 
 DATA = Path("data/fanuc")
 FIELDS = (STEPS, GROUP, *QUERY_FIELDS, *COMMANDED_FIELDS, *ERROR_FIELDS, STATUS)
+START_FIELDS = (RESTART, STEPS, GROUP, *ERROR_FIELDS, STATUS)
 
 
 def parts(section: Section) -> list[Part]:
@@ -117,18 +118,20 @@ def prepare(
     restarts: Path | None = None,
     path: Path | None = None,
 ) -> Work:
-    """Errors of the method; of all starts of its network, if there are several, the statistics."""
+    """Errors of the method, and of all starts of its network where there are several."""
     query = array(read_table(asked_for), QUERY_FIELDS)
     chosen = _methods(arm, kind, networks, path)
     starts = [] if restarts is None else _methods(arm, kind, restarts)
-    items = [Item(arm, each, query, refinement) for each in chosen]
-    items += [Item(arm, each, query, None) for each in starts]
+    items = [Item(arm, each, query, refinement) for each in (*chosen, *starts)]
 
     def finish(results: list[Table]) -> Mapping[str, Writer]:
         writers = {".parquet": table(results[0], FIELDS)}
         if starts:
-            found = [_statistics(k, each) for k, each in enumerate(results[1:])]
-            writers[".start_errors.parquet"] = table(stacked(found, START_ERRORS), START_ERRORS)
+            each = [
+                {**r, RESTART.name: np.full(len(r[STEPS.name]), k)}
+                for k, r in enumerate(results[1:])
+            ]
+            writers[".starts.parquet"] = table(stacked(each, START_FIELDS), START_FIELDS)
         return writers
 
     return Work(errors_of, items, finish)
@@ -155,13 +158,3 @@ def judge(arm: SerialArm, query: Array, values: Array) -> dict[str, NDArray]:
     there = configuration(arm, values) == number
     found = distance, angle, there.astype(np.int64)
     return {field.name: column for field, column in zip(ERROR_FIELDS, found, strict=True)}
-
-
-def _statistics(start: int, errors: Table) -> Table:
-    values = (
-        start,
-        errors["error"].mean(),
-        errors["error"].max(),
-        errors["orientation_error"].mean(),
-    )
-    return {field.name: np.array([v]) for field, v in zip(START_ERRORS, values, strict=True)}

@@ -47,12 +47,6 @@ ERROR_FIELDS = (
     Field("in_configuration", "1", "1 if in the arm configuration asked for", "int64"),
 )
 RESTART = Field("restart", "1", "number of the start, from 0", "int64")
-START_ERRORS = (
-    RESTART,
-    Field("mean_error", "m", "mean distance of the end effector from its target"),
-    Field("max_error", "m", "largest distance"),
-    Field("mean_orientation_error", "rad", "mean angle of the end effector to its target"),
-)
 CURVE_FIELDS = (
     RESTART,
     Field("joint", "1", "number of the joint", "int64"),
