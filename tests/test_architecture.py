@@ -1,13 +1,14 @@
 """Rooms import only downwards, stages know no case, and DVC watches what its stages use."""
 
 import ast
+import re
 import sys
 from pathlib import Path
 
 import pytest
 import yaml
 
-from flexik.cases.case import STAGES, case_names
+from flexik.cases.case import STAGES, codes
 from flexik.datasets import code
 
 ROOT = Path(__file__).parents[1]
@@ -39,7 +40,7 @@ HOMES = {
 PICKLES = {"pickle", "cPickle", "_pickle", "cloudpickle", "dill", "shelve", "marshal"}
 LONGEST = {"file": 400, "function": 60, "script": 60}
 
-CASES = case_names()
+CASES = codes()
 MODULES = sorted(SOURCE.rglob("*.py"))
 SCRIPTS = sorted((ROOT / "stages").glob("*.py"))
 EVERYTHING = [*MODULES, *SCRIPTS, *(ROOT / "profiles").glob("*.py"), *ROOT.glob("benchmarks/*.py")]
@@ -136,9 +137,9 @@ def test_stages_know_no_case(path):
 
 def test_dvc_yaml_names_cases_in_lists_alone():
     text = (ROOT / "dvc.yaml").read_text()
-    lines = [line for line in text.splitlines() if any(case in line for case in CASES)]
-    assert all(line.strip().startswith(("deps: [", "- cases: [", "metrics: [", "plots: [", "reports/"))
-               for line in lines)  # fmt: skip
+    lists = re.sub(r"\[[^\[\]]*\]", "", text[text.index("  readme:") :])
+    rest = text[: text.index("  readme:")] + lists
+    assert not [case for case in CASES if case in rest]
 
 
 PARAMETERS = yaml.safe_load((ROOT / "params.yaml").read_text())
@@ -146,20 +147,26 @@ PIPELINE = yaml.safe_load((ROOT / "dvc.yaml").read_text())
 
 
 def stages():
-    """All stages of dvc.yaml by name and case, matrix put in."""
+    """All stages of dvc.yaml by name and case, foreach put in."""
     found = {}
     for name, stage in PIPELINE["stages"].items():
-        for case in PIPELINE["vars"][0]["cases"] if "matrix" in stage else [""]:
-            found[name, case] = filled(stage, case)
+        if "foreach" not in stage:
+            found[name, ""] = stage
+            continue
+        assert stage["foreach"] == "${cases}"
+        for case, entry in PARAMETERS["cases"].items():
+            found[name, case] = filled(stage["do"], case, entry["code"])
     return found
 
 
-def filled(value, case):
+def filled(value, case, code):
     if isinstance(value, dict):
-        return {filled(k, case): filled(v, case) for k, v in value.items()}
+        return {filled(k, case, code): filled(v, case, code) for k, v in value.items()}
     if isinstance(value, list):
-        return [filled(v, case) for v in value]
-    return value.replace("${item.case}", case) if isinstance(value, str) else value
+        return [filled(v, case, code) for v in value]
+    if not isinstance(value, str):
+        return value
+    return value.replace("${key}", case).replace("${item.code}", code)
 
 
 FILLED = stages()
@@ -175,10 +182,10 @@ def covers(dependency, path):
 
 
 def test_every_case_runs_every_stage():
-    assert sorted(PIPELINE["vars"][0]["cases"]) == CASES
-    by_case = [name for name, stage in PIPELINE["stages"].items() if "matrix" in stage]
+    assert sorted(entry["code"] for entry in PARAMETERS["cases"].values()) == CASES
+    by_case = [name for name, stage in PIPELINE["stages"].items() if "foreach" in stage]
     assert by_case == [*STAGES, "report"]
-    scripts = {stage["cmd"].split()[1] for stage in PIPELINE["stages"].values()}
+    scripts = {stage["cmd"].split()[1] for stage in FILLED.values()}
     assert scripts == {relative(path) for path in SCRIPTS} - {"stages/start.py"}
 
 

@@ -42,10 +42,10 @@ def project(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         section = cases.load("elastic_arm", folder / "params.yaml")
-        cases.module("elastic_arm", "section").check(section)
+        cases.check(section)
         for stage in STAGES:
-            parts = cases.parts("elastic_arm", section, stage)
-            make(cases.folder("elastic_arm", stage), parts, ParallelSettings(n_workers=1))
+            parts = cases.parts(section, stage)
+            make(section.data / cases.STAGES[stage], parts, ParallelSettings(n_workers=1))
         report(section)
         yield folder, section
 

@@ -45,11 +45,11 @@ def changed(original, monkeypatch):
         else:
             section[last] = value
         monkeypatch.setattr(cases, "_read", lambda path: files[Path(path)])
-        if case in ("parallel", "trainers") or case not in cases.case_names():
+        if case not in cases.codes():
             cases.load_parallel()
             return cases.load_all()
         found = cases.load(case)
-        cases.module(case, "section").check(found)
+        cases.check(found)
         return found
 
     return load
@@ -58,9 +58,9 @@ def changed(original, monkeypatch):
 def test_what_stands_in_the_files_is_valid(monkeypatch):
     monkeypatch.chdir(ROOT)
     found = cases.load_all()
-    assert list(found) == cases.case_names() == ["crane", "elastic_arm", "fanuc", "smartee"]
-    for name, section in found.items():
-        cases.module(name, "section").check(section)
+    assert list(found) == cases.codes() == ["crane", "elastic_arm", "fanuc", "smartee"]
+    for section in found.values():
+        cases.check(section)
     crane = found["crane"]
     assert crane.networks["deflection"].n_hidden == 14
     assert crane.calibration.conditions == crane.conditions["published"]  # as published
@@ -74,8 +74,8 @@ def test_profiles_are_valid(original, path, monkeypatch):
         Path("params.yaml"): overlay(original[Path("params.yaml")], read_yaml(path)),
     }
     monkeypatch.setattr(cases, "_read", lambda path: files[Path(path)])
-    for name, section in cases.load_all().items():
-        cases.module(name, "section").check(section)
+    for section in cases.load_all().values():
+        cases.check(section)
 
 
 GRID, BEAMS = "crane.samples.grid", "crane.machine.structure.beams"
@@ -187,6 +187,8 @@ WRONG = [
     (f"{INVERSION}.damping", 0.01),  # of the other kind
     ("crane.methods.inverse.n_corrections", 1),
     ("robot", {}),
+    ("cases", {"crane": {"code": "robot"}}),
+    ("cases", {"My own": {"code": "crane"}}),
     ("crane.machine.structure.gravity", ...),
     (f"{BEAMS}.pillar", ...),
     ("trainers.study.kind", ...),
@@ -368,6 +370,7 @@ def test_every_value_stands_by_a_comment(path):
     bare = []
     for leaf in leaves(yaml.compose(text)):
         # below the case itself, a comment on a block speaks for the keys in it
-        if not any(commented(line) for _, line in leaf[first:]) and leaf[-1][0] != "seed":
+        held = leaf[first:] or leaf
+        if not any(commented(line) for _, line in held) and leaf[-1][0] != "seed":
             bare.append(".".join(name for name, _ in leaf))
     assert not bare

@@ -39,8 +39,8 @@ def _stage(name: str, case: str) -> None:
         print(f"note: {other}", file=sys.stderr)
     section, parallel = cases.load(case), from_environment(cases.load_parallel())
     if name == "report":
-        found = cases.module(case, "report")
+        found = cases.module(section.code, "report")
         assert found is not None  # a test sees to it
         found.report(section)
     else:
-        make(cases.folder(case, name), cases.parts(case, section, name), parallel)
+        make(section.data / cases.STAGES[name], cases.parts(section, name), parallel)

@@ -1,7 +1,7 @@
 """What every case gives, and how it is loaded.
 
-A case NAME is the section NAME of params.yaml, the machine data/machines/NAME.yaml and the folder
-flexik/cases/NAME:
+A case NAME is an entry under `cases` of params.yaml, the section NAME there, the machine
+data/machines/NAME.yaml and the code of the folder flexik/cases/CODE, which the entry names:
 
     section.py    `Section`, the validated section, a parameters.section.CaseSection (its `machine`
                   is the validated machine file, its `trainers` are the named ones of params.yaml),
@@ -26,9 +26,10 @@ from typing import Any
 from flexik.datasets.parallel import ParallelSettings
 from flexik.datasets.parts import Part
 from flexik.errors import ParameterError
+from flexik.parameters.model import Model, Name
 from flexik.parameters.reading import PARAMETERS_FILE, read_yaml, validated
+from flexik.parameters.section import MACHINES, CaseSection
 
-MACHINES, DATA, REPORTS = Path("data/machines"), Path("data"), Path("reports")
 # Stages of parts, and the folders of data/NAME that they fill
 STAGES = {
     "calibrate": "constants",
@@ -39,12 +40,29 @@ STAGES = {
     "study": "studies",
 }
 # Keys of params.yaml that are no case
-SHARED = ("parallel", "trainers")
+SHARED = ("cases", "parallel", "trainers")
 
 
-def case_names() -> list[str]:
-    """Names of all cases, sorted."""
+class Entry(Model):
+    """An entry under `cases`: the folder whose code the case runs."""
+
+    code: Name
+
+
+def codes() -> list[str]:
+    """Folders of cases, sorted."""
     return sorted(path.parent.name for path in Path(__file__).parent.glob("*/section.py"))
+
+
+def entries(file: Path | str = PARAMETERS_FILE) -> dict[str, Entry]:
+    """What stands under `cases`; raises ParameterError as `load` does."""
+    given = {"cases": _read(file).get("cases", {})}
+    found = validated(dict[str, dict[Name, Entry]], given, lambda at: (str(file), ".".join(at)))
+    for name, entry in found["cases"].items():
+        if entry.code not in codes():
+            known = ", ".join(codes())
+            raise ParameterError(f"{file}: cases.{name}.code: expected one of {known}")
+    return found["cases"]
 
 
 def load(name: str, file: Path | str = PARAMETERS_FILE) -> Any:
@@ -53,17 +71,19 @@ def load(name: str, file: Path | str = PARAMETERS_FILE) -> Any:
     Raises ParameterError, one line a wrong value, if there is no such case, a file is missing or no
     YAML, or a value is unknown, missing or out of range.
     """
-    return _section(name, _read(file), str(file))
+    known = entries(file)
+    if name not in known:
+        raise ParameterError(f"{file}: there is no case {name!r} ({', '.join(known)})")
+    return _section(name, known[name].code, _read(file), str(file))
 
 
 def load_all(file: Path | str = PARAMETERS_FILE) -> dict[str, Any]:
     """Sections of all cases of `file` by name; raises ParameterError as `load` does."""
-    data = _read(file)
-    for key in data:
-        if key not in (*SHARED, *case_names()):
-            known = ", ".join((*SHARED, *case_names()))
-            raise ParameterError(f"{file}: {key}: unknown, expected one of {known}")
-    return {name: _section(name, data, str(file)) for name in case_names() if name in data}
+    names = [*SHARED, *entries(file)]
+    for key in _read(file):
+        if key not in names:
+            raise ParameterError(f"{file}: {key}: unknown, expected one of {', '.join(names)}")
+    return {name: load(name, file) for name in entries(file)}
 
 
 def load_parallel(file: Path | str = PARAMETERS_FILE) -> ParallelSettings:
@@ -81,9 +101,9 @@ def load_parallel(file: Path | str = PARAMETERS_FILE) -> ParallelSettings:
     return found["parallel"]
 
 
-def module(case: str, name: str) -> ModuleType | None:
-    """Module `name` of a case; None if the case has none."""
-    full = f"flexik.cases.{case}.{name}"
+def module(code: str, name: str) -> ModuleType | None:
+    """Module `name` of the folder `code`; None if it has none."""
+    full = f"flexik.cases.{code}.{name}"
     try:
         return importlib.import_module(full)
     except ModuleNotFoundError as error:
@@ -92,15 +112,17 @@ def module(case: str, name: str) -> ModuleType | None:
         return None
 
 
-def parts(name: str, section: Any, stage: str) -> list[Part]:
-    """Parts of `stage` of the case `name`; none where the case has no such stage."""
-    found = module(name, f"parts.{stage}")
+def check(section: CaseSection) -> None:
+    """Find what no single value tells; raises ParameterError, one line with file and key."""
+    found = module(section.code, "section")
+    assert found is not None  # the section was loaded by it
+    found.check(section)
+
+
+def parts(section: CaseSection, stage: str) -> list[Part]:
+    """Parts of `stage`; none where the case has no such stage."""
+    found = module(section.code, f"parts.{stage}")
     return [] if found is None else found.parts(section)
-
-
-def folder(name: str, stage: str) -> Path:
-    """Where the parts of `stage` lie."""
-    return DATA / name / STAGES[stage]
 
 
 @functools.cache
@@ -108,16 +130,16 @@ def _read(file: Path | str) -> dict[str, Any]:
     return read_yaml(file)
 
 
-def _section(name: str, data: Mapping[str, Any], file: str) -> Any:
-    found = module(name, "section")
-    if found is None or name not in data:
-        raise ParameterError(f"{file}: there is no case {name!r} ({', '.join(case_names())})")
-    machine = MACHINES / f"{name}.yaml"
-    if not isinstance(data[name], Mapping):
+def _section(name: str, code: str, data: Mapping[str, Any], file: str) -> Any:
+    found, machine = module(code, "section"), MACHINES / f"{name}.yaml"
+    assert found is not None  # codes() found it
+    given = data.get(name)
+    if not isinstance(given, Mapping):
         raise ParameterError(f"{file}: {name}: expected a mapping of keys to values")
     whole = {
-        **data[name],
+        **given,
         "name": name,
+        "code": code,
         "machine": _read(machine),
         "trainers": data.get("trainers", {}),
     }

@@ -11,10 +11,12 @@ DATA, REPORTS, MACHINES = Path("data"), Path("reports"), Path("data/machines")
 class CaseSection(Model):
     """A case by the name of its section; a case adds its machine and its own keys.
 
+    code : folder of flexik/cases whose code it runs
     calibration : settings of the fit where constants of the machine are free
     """
 
     name: Name
+    code: Name
     trainers: dict[Name, Trainer]
     calibration: None = None
 
