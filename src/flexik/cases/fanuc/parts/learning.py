@@ -6,6 +6,7 @@ from typing import Self
 
 import numpy as np
 import pandas as pd
+from scipy.linalg import block_diag
 
 from flexik.cases.fanuc.parts.tables import JOINT_FIELDS, POSITION_FIELDS, array
 from flexik.kinematics.serial_arm import Array
@@ -122,23 +123,18 @@ def side_by_side(networks: Sequence[Network]) -> Network:
 
     Their hidden layers stand side by side; a weight from one to the output of another is 0.
     """
-    first, ends = networks[0], np.cumsum([0, *(len(each.weights[0]) for each in networks)])
+    first, last = networks[0], [each.weights[1] for each in networks]
     hidden = np.vstack([each.weights[0] for each in networks])
-    outputs = tuple(quantity for each in networks for quantity in each.outputs)
-    last = np.zeros((len(outputs), len(hidden) + 1))
-    row = 0
-    for each, begin, end in zip(networks, ends, ends[1:], strict=False):
-        rows = slice(row, row + len(each.outputs))
-        last[rows, begin:end], last[rows, -1] = each.weights[1][:, :-1], each.weights[1][:, -1]
-        row = rows.stop
+    biases = np.concatenate([matrix[:, -1] for matrix in last])
+    output = np.column_stack([block_diag(*(matrix[:, :-1] for matrix in last)), biases])
+    scales = [each.output_normalisation for each in networks]
     normalisation = Normalisation(
-        *(
-            np.concatenate([getattr(each.output_normalisation, name) for each in networks])
-            for name in ("minimum", "maximum")
-        )
+        np.concatenate([scale.minimum for scale in scales]),
+        np.concatenate([scale.maximum for scale in scales]),
     )
+    outputs = tuple(quantity for each in networks for quantity in each.outputs)
     where = first.input_normalisation, normalisation, first.inputs, outputs
-    return Network((hidden, last), first.activation, *where)
+    return Network((hidden, output), first.activation, *where)
 
 
 def percent(found: Array, expected: Array, ranges: Array) -> Array:
