@@ -1,14 +1,18 @@
 """The log crane and its test conditions, as params.yaml has them; the pipeline run once."""
 
+import os
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from flexik import kernels
 
 kernels.fix()  # as the stages do, before NumPy is imported
+# for processes that tests start: flexik itself is not installed
+os.environ["PYTHONPATH"] = str(Path(__file__).parents[1] / "src")
 
 import numpy as np  # noqa: E402
 from smoke_pipeline import ROOT, environment  # noqa: E402
