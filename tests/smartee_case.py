@@ -11,7 +11,8 @@ ROOT = Path(__file__).parents[1]
 def section() -> dict:
     given = read_yaml(ROOT / "params.yaml")
     machine = read_yaml(ROOT / "data/machines/smartee.yaml")
-    return given["smartee"] | {"trainers": given["trainers"], "machine": machine}
+    names = {"name": "smartee", "code": "smartee"}
+    return given["smartee"] | names | {"trainers": given["trainers"], "machine": machine}
 
 
 def small(**changes) -> Section:

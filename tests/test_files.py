@@ -2,18 +2,15 @@
 
 import hashlib
 import stat
-from types import ModuleType
 
 import pytest
 
-from flexik import datasets, mechanisms
 from flexik.errors import DataError
 from flexik.files import (
     atomic_path,
     checksum,
     file_checksum,
     read_json,
-    source_checksum,
     write_json,
     write_text,
 )
@@ -98,24 +95,3 @@ def test_checksum_of_a_file_is_that_of_its_bytes(tmp_path):
     assert file_checksum(path) == checksum(b"1\r\n")
     with pytest.raises(DataError, match=r"b\.csv: cannot be read"):
         file_checksum(tmp_path / "b.csv")
-
-
-def package(folder):
-    module = ModuleType("made_up")
-    module.__path__ = [str(folder)]
-    return module
-
-
-def test_checksum_of_source_changes_with_the_code(tmp_path):
-    (tmp_path / "deep").mkdir()
-    (tmp_path / "a.py").write_text("x = 1\n")
-    (tmp_path / "deep" / "b.py").write_text("y = 1\n")
-    before = source_checksum(package(tmp_path))
-    (tmp_path / "notes.md").write_text("no code")
-    assert source_checksum(package(tmp_path)) == before
-    (tmp_path / "deep" / "b.py").write_text("y = 2\n")
-    changed = source_checksum(package(tmp_path))
-    assert changed != before
-    (tmp_path / "c.py").write_text("")
-    assert source_checksum(package(tmp_path)) != changed
-    assert source_checksum(mechanisms) != source_checksum(mechanisms, datasets)

@@ -7,7 +7,6 @@ import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 from flexik.errors import DataError
@@ -55,12 +54,6 @@ def file_checksum(path: Path | str) -> str:
         return checksum(Path(path).read_bytes())
     except OSError as error:
         raise DataError(f"{path}: cannot be read ({error.strerror})") from None
-
-
-def source_checksum(*packages: ModuleType) -> str:
-    """SHA-256 of the Python files of `packages`: a change of code is a change of version."""
-    files = sorted(file for p in packages for file in Path(p.__path__[0]).rglob("*.py"))
-    return checksum(*(file.read_bytes() for file in files))
 
 
 def write_json(path: Path | str, data: object) -> None:
