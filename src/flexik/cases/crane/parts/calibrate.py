@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from flexik.cases.crane.parts.conditions import at_points
-from flexik.cases.crane.parts.fields import columns_of
+from flexik.cases.crane.parts.crane import columns_of
 from flexik.cases.crane.section import Calibration, Section
 from flexik.datasets.parts import Part, Work, Writer, json_file, whole
 from flexik.datasets.tables import read_csv

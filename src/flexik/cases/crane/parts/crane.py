@@ -5,12 +5,15 @@ from typing import Any
 
 import numpy as np
 
+from flexik.cases.crane.parts.fields import QUERY_FIELDS, SAMPLE_FIELDS
 from flexik.cases.crane.section import Section
+from flexik.evaluation.errors import TIP_ERRORS
 from flexik.kinematics.manipulator import Array
 from flexik.machines.crane import Machine
 from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
 from flexik.multibody.crane.model import tips
 from flexik.multibody.crane.structure import FlexibleCrane
+from flexik.positioning.method import Columns
 
 DATA = Path("data/crane")
 SPRING = DATA / "constants/spring.json"
@@ -35,3 +38,14 @@ def sorted_tips(crane: FlexibleCrane, strokes: Array, payload: Array) -> Array:
     result = np.empty((len(strokes), 2))
     result[order] = tips(crane, strokes[order], payload[order])
     return result
+
+
+def columns_of(machine: Machine) -> Columns:
+    """Columns of queries, answers and errors."""
+    return Columns(
+        QUERY_FIELDS,
+        SAMPLE_FIELDS[:3],
+        TIP_ERRORS,
+        (0.0, 0.0, 0.0),
+        machine.geometry.stroke_maximum,
+    )

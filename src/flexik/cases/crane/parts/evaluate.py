@@ -14,8 +14,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from flexik.cases.crane.parts.conditions import at, at_points
-from flexik.cases.crane.parts.crane import flexible, model_inputs, sorted_tips
-from flexik.cases.crane.parts.fields import TARGET_FIELDS, columns_of
+from flexik.cases.crane.parts.crane import columns_of, flexible, model_inputs, sorted_tips
+from flexik.cases.crane.parts.fields import TARGET_FIELDS
 from flexik.cases.crane.parts.methods import (
     NETWORKS,
     SAMPLES,

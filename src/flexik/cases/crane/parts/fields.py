@@ -5,9 +5,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from flexik.datasets.tables import Field
-from flexik.evaluation.errors import TIP_ERRORS
-from flexik.machines.crane import Machine
-from flexik.positioning.method import Columns
 
 Array = NDArray[np.float64]
 
@@ -34,17 +31,6 @@ TARGET_FIELDS = (
     *QUERY_FIELDS,
     *(Field(name, "m", "puts the loaded tip on the target") for name in STROKES),
 )
-
-
-def columns_of(machine: Machine) -> Columns:
-    """Columns of queries, answers and errors."""
-    return Columns(
-        QUERY_FIELDS,
-        SAMPLE_FIELDS[:3],
-        TIP_ERRORS,
-        (0.0, 0.0, 0.0),
-        machine.geometry.stroke_maximum,
-    )
 
 
 def kept(table: pd.DataFrame) -> pd.DataFrame:

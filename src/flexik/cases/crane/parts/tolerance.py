@@ -8,8 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from flexik.cases.crane.parts.conditions import at_points
-from flexik.cases.crane.parts.crane import flexible, model_inputs, sorted_tips
-from flexik.cases.crane.parts.fields import columns_of
+from flexik.cases.crane.parts.crane import columns_of, flexible, model_inputs, sorted_tips
 from flexik.cases.crane.parts.methods import method_inputs, method_settings, trained_method
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part, Work, rows
