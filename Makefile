@@ -47,7 +47,7 @@ $(BENCHMARKS): export OPENBLAS_NUM_THREADS := 1
 $(BENCHMARKS): export MKL_NUM_THREADS := 1
 
 benchmark: $(VENV)/.dev ## timings of the generation beside other ways; writes reports/benchmarks/
-	$(BIN)/python benchmarks/generate.py
+	$(BIN)/python benchmarks/generation.py
 
 benchmark-training: $(VENV)/.benchmark ## timings of the trainers beside other packages
 	$(BIN)/python benchmarks/training.py

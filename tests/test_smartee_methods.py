@@ -76,14 +76,14 @@ def test_rows_do_not_depend_on_their_company(network):
     ):
         together = method(conditions.query, conditions.current)
         alone = [method(one.query, one.current) for one in conditions.chunks(1)]
-        found = np.vstack([answer.values for answer in alone])  # noqa: PD011
+        found = np.vstack([answer.values for answer in alone])
         np.testing.assert_allclose(found, together.values, rtol=1e-13)
 
 
 def test_along_a_path_every_sample_starts_from_the_one_before():
     conditions, judge, _ = asked("path_1000")
     answer = DirectKinematics(GEOMETRY, "previous", 1)(conditions.query, conditions.current)
-    found = answer.values  # noqa: PD011
+    found = answer.values
     again = np.vstack([CENTRE, found[:-1]])
     one = DirectKinematics(GEOMETRY, "centre", 1)
     for k in (0, 7, 399):

@@ -28,7 +28,7 @@ from flexik.datasets.code import code_checksum
 from flexik.datasets.parallel import ParallelSettings, parallel_unordered
 from flexik.datasets.tables import Field, write_table
 from flexik.errors import DataError, FlexikError
-from flexik.files import atomic_path, checksum, file_checksum, read_json, write_json
+from flexik.files import atomic_path, checksum, file_checksum, read_json, write_json, write_text
 
 RECORD = ".part"
 Columns = Mapping[str, np.ndarray]
@@ -82,7 +82,7 @@ def stacked(results: Sequence[Columns], fields: Sequence[Field]) -> dict[str, np
         if missing := [f.name for f in fields if f.name not in result]:
             raise DataError(f"expected columns {[f.name for f in fields]}, but {missing} missing")
     types = {"string": np.str_, "int64": np.int64, "float64": np.float64}
-    empty = {f.name: [np.empty(0, dtype=types[f.dtype])] for f in fields}
+    empty: dict[str, list[np.ndarray]] = {f.name: [np.empty(0, types[f.dtype])] for f in fields}
     found = {f.name: [result[f.name] for result in results] for f in fields} if results else empty
     return {name: np.concatenate(pieces) for name, pieces in found.items()}
 
@@ -99,7 +99,7 @@ def json_file(data: object) -> Writer:
 
 def text_file(text: str) -> Writer:
     """Writer of a text file."""
-    return lambda path: path.write_text(text, encoding="utf-8", newline="\n")
+    return lambda path: write_text(path, text)
 
 
 def make(folder: Path | str, parts: Sequence[Part], parallel: ParallelSettings) -> None:

@@ -105,7 +105,7 @@ def offset_table(offsets: Offsets, settings: Expected) -> pd.DataFrame:
             "unit": ["1" if name in FACTORS else "m" for name in OFFSETS],
             "expected": expected,
             "expected_deviation": deviation,
-            "identified": offsets.values,  # noqa: PD011 - no frame
+            "identified": offsets.values,
             "deviation": offsets.deviations,
         }
     )
@@ -124,7 +124,7 @@ def commands(
     methods = {"none": uncompensated(crane), "nominal": nominal, "adapted": adapted}
     for name, method in methods.items():
         answer = method(query, current)
-        table[[f"{name}_{stroke}" for stroke in STROKES]] = answer.values  # noqa: PD011 - no frame
+        table[[f"{name}_{stroke}" for stroke in STROKES]] = answer.values
     return table.assign(status=answer.status)
 
 
