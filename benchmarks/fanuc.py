@@ -40,7 +40,7 @@ from flexik.positioning.method import Method
 from flexik.positioning.refined import Refined
 from flexik.reporting.tables import write_table
 
-SAMPLES, OUTPUT = Path("data/fanuc/samples"), Path("reports/benchmarks")
+OUTPUT = Path("reports/benchmarks")
 N_REPEATS, N_SINGLE, N_BATCHED = 15, 200, 2000
 MICROSECONDS, MM, DEGREES = 1e6, 1e3, 180.0 / np.pi
 # Hidden neurons of each layer, passes
@@ -101,7 +101,7 @@ def own_case(method: Method, query: Array) -> Case:
 
 def measure(section: Section, arm: SerialArm) -> pd.DataFrame:
     """A row for every method; in each repeat all follow one another."""
-    poses = read_table(SAMPLES / "conditions/random_poses.parquet")
+    poses = read_table(section.data / "samples" / "conditions/random_poses.parquet")
     poses = poses.sample(min(N_BATCHED, len(poses)), random_state=1)
     query = np.ascontiguousarray(array(poses, QUERY_FIELDS))
     known = {name: own_case(method, query) for name, method in methods(section, arm).items()}
@@ -133,8 +133,8 @@ def timed(query: Callable[..., object], arguments: tuple[Any, ...]) -> float:
 def grow(section: Section, arm: SerialArm) -> pd.DataFrame:
     """A row a network of GROWTH."""
     poses, targets = (
-        read_table(SAMPLES / "poses.parquet", POSE_FIELDS),
-        read_table(SAMPLES / "conditions/random_poses.parquet"),
+        read_table(section.data / "samples" / "poses.parquet", POSE_FIELDS),
+        read_table(section.data / "samples" / "conditions/random_poses.parquet"),
     )
     joints = array(poses[poses["configuration"] == 0], JOINT_FIELDS)
     query = array(targets[targets["configuration"] == 0], QUERY_FIELDS)

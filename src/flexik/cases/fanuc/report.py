@@ -10,7 +10,7 @@ import pandas as pd
 
 from flexik.cases.fanuc.parts.samples import SHORTER
 from flexik.cases.fanuc.report_figures import FLOOR, figures, trainer_kinds
-from flexik.cases.fanuc.report_results import DATA, PUBLISHED, Results, having, label, read
+from flexik.cases.fanuc.report_results import PUBLISHED, Results, having, label, read
 from flexik.cases.fanuc.report_tables import (
     JOINTS,
     PASS_ERRORS,
@@ -31,11 +31,11 @@ def report(section: Section) -> None:
     """Write reports/fanuc from data/fanuc."""
     results = read(section)
     write_report(
-        Path("reports/fanuc"),
+        section.report,
         Path(__file__).with_name("page.md.j2"),
         Content(tables(results), figures(results), metrics(results), values(results)),
         sources=made_from(section, [PUBLISHED]),
-        record=DATA / "report.json",
+        record=section.data / "report.json",
     )
 
 

@@ -25,7 +25,7 @@ from flexik.kinematics.serial_arm import Array, SerialArm
 from flexik.kinematics.status import REACHED
 from flexik.reporting.report import digest
 
-DATA, BENCHMARKS = Path("data/fanuc"), Path("reports/benchmarks")
+BENCHMARKS = Path("reports/benchmarks")
 PUBLISHED = Path("data/reference/fanuc/total_errors.csv")
 TIMES = ("microseconds_single", "microseconds_batched")
 GROWTH = (
@@ -163,7 +163,7 @@ def read(section: Section) -> Results:
     """All of it; raises DataError if something is missing, damaged or impossible."""
     tables = {
         kind: pd.concat(
-            read_table(DATA / f"networks/{name}.{kind}.parquet").assign(network=name)
+            read_table(section.data / f"networks/{name}.{kind}.parquet").assign(network=name)
             for name in section.path_networks
         )
         for kind in ("starts", "curves")
@@ -174,14 +174,14 @@ def read(section: Section) -> Results:
         for name in section.path_networks
     ]
     studies = {
-        name: read_table(DATA / f"studies/{name}.parquet")
+        name: read_table(section.data / f"studies/{name}.parquet")
         for name in type(section.studies).model_fields
     }
     times = read_csv(BENCHMARKS / "fanuc.csv", TIMES, ("method", "settings"), ("method",))
     growth = read_csv(BENCHMARKS / "fanuc_growth.csv", GROWTH, ("n_hidden", "settings"))
     return Results(
         section=section,
-        path=read_table(DATA / "samples/path.parquet", PATH_FIELDS),
+        path=read_table(section.data / "samples/path.parquet", PATH_FIELDS),
         **tables,
         start_errors=pd.concat(start_errors, ignore_index=True),
         studies=studies,
@@ -198,8 +198,8 @@ def _errors(section: Section, part: str, kind: str = "") -> pd.DataFrame:
     """Rows of Results.errors of the part "CONDITIONS/METHOD"; of all starts: `kind` ".starts"."""
     conditions, method = part.split("/")
     queries = [field.name for field in QUERY_FIELDS]
-    asked = read_table(DATA / f"samples/conditions/{conditions}.parquet")
-    found = read_table(DATA / f"errors/{part}{kind}.parquet")
+    asked = read_table(section.data / f"samples/conditions/{conditions}.parquet")
+    found = read_table(section.data / f"errors/{part}{kind}.parquet")
     found = found.drop(columns=queries, errors="ignore").join(
         asked.drop(columns=queries), on="point"
     )

@@ -280,8 +280,8 @@ def check(section: Section) -> None:
         arm = arm_of(section.machine.joints)
         check_spherical_wrist(arm)
     except ParameterError as error:
-        raise ParameterError(f"data/machines/fanuc.yaml: joints: {error}") from None
+        raise ParameterError(f"{section.machine_file}: joints: {error}") from None
     try:
         taught_path(arm, section.samples.path)
     except ParameterError as error:
-        raise ParameterError(f"params.yaml: {error}") from None
+        raise ParameterError(f"params.yaml: {section.name}.samples.path: {error}") from None

@@ -37,7 +37,6 @@ from flexik.positioning.nearest_sample import NearestSample
 from flexik.positioning.predicted import Predicted
 from flexik.positioning.refined import Refined
 
-DATA = Path("data/fanuc")
 FIELDS = (STEPS, GROUP, *QUERY_FIELDS, *COMMANDED_FIELDS, *ERROR_FIELDS, STATUS)
 START_FIELDS = (RESTART, STEPS, GROUP, *ERROR_FIELDS, STATUS)
 
@@ -58,7 +57,7 @@ def parts(section: Section) -> list[Part]:
                 "kind": method.kind,
                 "refinement": None if where == "path" or name == EXACT else steps,
             }
-            asked_for = DATA / f"samples/conditions/{where}.parquet"
+            asked_for = section.data / f"samples/conditions/{where}.parquet"
             inputs = {"asked_for": asked_for, **inputs_of(section, name)}
             found.append(Part(f"{where}/{name}", prepare, settings, inputs))
     return found
@@ -67,11 +66,11 @@ def parts(section: Section) -> list[Part]:
 def inputs_of(section: Section, name: str) -> dict[str, Path]:
     """Files that the method `name` is made of."""
     if name == WHOLE:
-        return {"networks": DATA / f"networks/{name}.json"}
+        return {"networks": section.data / f"networks/{name}.json"}
     if name in section.networks:
         files = {"networks": f"{name}.json", "restarts": f"{name}.restarts.json"}
-        return {key: DATA / "networks" / file for key, file in files.items()}
-    return {"path": DATA / "samples/path.parquet"} if name in LOOKED_UP else {}
+        return {key: section.data / "networks" / file for key, file in files.items()}
+    return {"path": section.data / "samples/path.parquet"} if name in LOOKED_UP else {}
 
 
 def method(section: Section, name: str) -> Method:

@@ -27,14 +27,13 @@ from flexik.kinematics.pose_representation import queries
 from flexik.kinematics.serial_arm import SerialArm, forward, smallest_singular_value
 from flexik.kinematics.spherical_wrist import N_CONFIGURATIONS, configuration, inverse
 
-SAMPLES = Path("data/fanuc/samples")
 TRAINING, TARGETS = 0, 1
 
 
 def parts(section: Section) -> list[Part]:
     """The path and poses to learn from; a table of targets for every set of conditions."""
     arm, samples, asked = arm_of(section.machine.joints), section.samples, section.conditions
-    path = {"path": SAMPLES / "path.parquet"}
+    path = {"path": section.data / "samples/path.parquet"}
     training = {"n": samples.n_poses, "seed": samples.seed, "role": TRAINING, "length": None}
     targets = {
         "n": asked.random_poses.n_targets,

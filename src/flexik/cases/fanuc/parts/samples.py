@@ -43,9 +43,7 @@ def taught_path(arm: SerialArm, path: Path) -> TaughtPath:
     outside = (joints < np.array(arm.minimum)) | (joints > np.array(arm.maximum))
     if outside.any():
         joint = int(np.argmax(outside.any(axis=0))) + 1
-        raise ParameterError(
-            f"fanuc.samples.path: the path of seed {path.seed} leaves limits of J{joint}"
-        )
+        raise ParameterError(f"the path of seed {path.seed} leaves limits of J{joint}")
     passed = np.floor(np.arange(n + 1) * path.n_test / n + 0.5)
     return TaughtPath(share, joints, np.diff(passed) > 0)
 

@@ -13,8 +13,6 @@ from flexik.datasets.tables import read_table
 from flexik.learning.training import Architecture
 from flexik.parameters.trainers import BackPropagation
 
-PATH = Path("data/fanuc/samples/path.parquet")
-
 
 def parts(section: Section) -> list[Part]:
     """Studies of the number of hidden neurons and of the learning factor."""
@@ -32,7 +30,7 @@ def parts(section: Section) -> list[Part]:
             "seed": network.seed,
             "trainer": section.trainers[network.trainer].but(n_iterations=study.n_iterations),
         }
-        found.append(Part(name, prepare, settings, {"path": PATH}))
+        found.append(Part(name, prepare, settings, {"path": section.data / "samples/path.parquet"}))
     return found
 
 

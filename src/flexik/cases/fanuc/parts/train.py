@@ -30,13 +30,12 @@ from flexik.learning.storage import network_file, packed, unpacked
 from flexik.learning.training import Architecture, Lesson, TrainingRecord, train
 from flexik.parameters.trainers import BackPropagation, Stopping
 
-SAMPLES = Path("data/fanuc/samples")
 ALL_JOINTS = tuple(range(1, 7))
 
 
 def parts(section: Section) -> list[Part]:
     """A part for every network, or networks of one name."""
-    found = []
+    found, samples = [], section.data / "samples"
     for name, network in section.networks.items():
         settings: dict[str, Any] = {
             "architecture": Architecture(network.sizes[0], network.activation),
@@ -45,10 +44,10 @@ def parts(section: Section) -> list[Part]:
         }
         if network.learns == "arm_configuration":
             settings["arm"] = arm_of(section.machine.joints)
-            found.append(Part(name, prepare_poses, settings, {"poses": SAMPLES / "poses.parquet"}))
+            found.append(Part(name, prepare_poses, settings, {"poses": samples / "poses.parquet"}))
         else:
             settings |= {"learns": network.learns, "n_restarts": network.n_restarts}
-            found.append(Part(name, prepare_path, settings, {"path": SAMPLES / "path.parquet"}))
+            found.append(Part(name, prepare_path, settings, {"path": samples / "path.parquet"}))
     return found
 
 
