@@ -7,23 +7,17 @@ Only the commanding is timed: targets, payloads and current strokes in, strokes 
 Needs `make repro` for data/crane. Writes reports/benchmarks/positioning.csv and .md.
 """
 
-# ruff: noqa: E402
+from machine import pinned_pool, remark
+
+# isort: split
 import math
-import os
 import statistics
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
-
-from flexik import kernels
-
-kernels.fix()  # before NumPy is imported
 
 import numpy as np
 import pandas as pd
-from training_race import pinned_pool
 
 from flexik import stage
 from flexik.cases.case import load
@@ -125,7 +119,7 @@ def measure() -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def notes(load: Mapping[str, float]) -> list[str]:
+def notes() -> list[str]:
     """What the table means."""
     return [
         "From targets, payloads and current strokes to commanded strokes; no flexible model.",
@@ -133,20 +127,18 @@ def notes(load: Mapping[str, float]) -> list[str]:
         "that take many steps for few targets hardly show in it. batched: one call with the first "
         "n_batched random targets, the time over their number; those searches show.",
         f"Medians of {N_REPEATS} repeats, in each of which all methods follow one another, after "
-        f"{N_WARM_UP} queries. One core, one BLAS thread; numpy {version('numpy')}, pymoo "
-        f"{version('pymoo')}; load of the machine {load['start']:.1f} at the start, "
-        f"{load['end']:.1f} at the end, of which this benchmark is up to 1.",
+        f"{N_WARM_UP} queries.",
+        remark(1, "numpy", "pymoo"),
     ]
 
 
 def main() -> None:
     """Measure and report."""
-    started, load = time.perf_counter(), {"start": os.getloadavg()[0]}
+    started = time.perf_counter()
     with pinned_pool(1) as pool:
         table = pool.submit(measure).result()
-    load["end"] = os.getloadavg()[0]
     caption = "Microseconds of a positioning query, for every method."
-    remarks = notes(load)
+    remarks = notes()
     write_table(OUTPUT, table, DECIMALS, caption, remarks)
     print(markdown(table, DECIMALS, caption, remarks))
     print(f"{time.perf_counter() - started:.0f} s in all")

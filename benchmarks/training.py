@@ -13,6 +13,9 @@ installed. Writes reports/benchmarks/training.csv, .md and .json and training_co
 --quick writes nothing.
 """
 
+from machine import LOAD_BEFORE, pinned_pool, remark
+
+# isort: split
 import argparse
 import math
 import os
@@ -42,8 +45,6 @@ from training_race import (
     RACES,
     Race,
     Runs,
-    installed,
-    pinned_pool,
     run_race,
     speedups,
 )
@@ -162,8 +163,6 @@ def notes(figures: dict[str, float], results: Results, samples: tuple[int, ...])
         f"{f[f'speedup_{race.name}_loose']:.0f})"
         for race in main
     )
-    known = [(peer.package, installed(peer.package)) for peer in PEERS.values()]
-    versions = ", ".join(sorted({f"{package} {found}" for package, found in known if found}))
     speedup, study, memory = (
         f["speedup_vs_best_peer"],
         f["study_seconds"],
@@ -190,13 +189,16 @@ def notes(figures: dict[str, float], results: Results, samples: tuple[int, ...])
         "are not counted, nor is asking them for their error. SciPy has an analytic Jacobian. "
         "MLPRegressor takes no start: the weights are put in as those of an earlier fit, and it is "
         "fitted on whenever it ends. Adam: batches of 128, rate 0.003. A package that misses "
-        "target 2 from the first start does not run from the others.",
+        "target 2 from the first start does not run from the others. OpenBLAS has the kernels that "
+        "the stages fix, torch those for AVX2 and its own choice of MKL's.",
         f"Cost: runs of {N_ITERATIONS} iterations, normalisation and rejected trials included; "
         "samples are a trained network's outputs for random inputs, no equilibria.",
-        f"{versions}; one core a run, {N_PROCESSES} races at a time; load of the machine "
-        f"{f['load_start']:.1f} at the start, {f['load_end']:.1f} at the end, of which this "
-        f"benchmark is up to {N_PROCESSES}.",
+        _remark_on_machine(),
     ]
+
+
+def _remark_on_machine() -> str:
+    return remark(N_PROCESSES, *sorted({"numpy"} | {peer.package for peer in PEERS.values()}))
 
 
 def main() -> None:
@@ -204,11 +206,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Training beside other packages; cost; memory.")
     parser.add_argument("--quick", action="store_true", help="a few minutes; writes no files")
     quick = parser.parse_args().quick
-    # before the processes import NumPy and torch
-    os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     races = QUICK_RACES if quick else RACES
     samples = SAMPLES[:2] if quick else SAMPLES
-    started, figures = time.perf_counter(), {"load_start": os.getloadavg()[0]}
+    started, figures = time.perf_counter(), {"load_start": LOAD_BEFORE}
     figures |= measure_study(STUDY_SIZES, 1 if quick else STUDY_RESTARTS, N_PROCESSES)
     print(f"study: {figures['study_seconds']:.1f} s", flush=True)
     with pinned_pool(1) as pool:
@@ -231,7 +231,7 @@ def main() -> None:
     if not quick:
         write_table(OUTPUT, tables[0], DECIMALS, captions[0], remarks)
         cost = OUTPUT.with_name(f"{OUTPUT.name}_cost")
-        write_table(cost, tables[1], COST_DECIMALS, captions[1])
+        write_table(cost, tables[1], COST_DECIMALS, captions[1], [_remark_on_machine()])
         write_json(OUTPUT.with_suffix(".json"), figures)
     print(markdown(tables[0], DECIMALS, captions[0], remarks))
     print(markdown(tables[1], COST_DECIMALS, captions[1]))

@@ -5,6 +5,9 @@ the path of a sample and the hidden size, this script trains once and prints its
 (Linux only, as the benchmark of the generation).
 """
 
+from machine import MEGABYTE, memory
+
+# isort: split
 import json
 import subprocess
 import sys
@@ -33,7 +36,6 @@ SIZES = (14, 30, 60)
 MAIN_SIZE = 30
 N_ITERATIONS = 10
 DGEMM_SIZE = 1000
-MEGABYTE = 2**20
 
 STUDY_SIZES = tuple(range(4, 41))
 STUDY_RESTARTS, STUDY_ITERATIONS = 10, 100
@@ -122,23 +124,17 @@ def _study(*, sizes: list[tuple[int, ...]], n_restarts: int) -> Work:
     return select(replace(crane_lesson("deflection"), settings=settings), sizes, n_restarts, None)
 
 
-def _status(name: str) -> float:
-    lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
-    kilobytes = next(int(line.split()[1]) for line in lines if line.startswith(f"{name}:"))
-    return 1024 * kilobytes / MEGABYTE
-
-
 def _train_and_report(path: Path, n_hidden: int) -> dict[str, float]:
     columns: Array = np.load(path)
     inputs, outputs = columns[:, :-2].copy(), columns[:, -2:].copy()
     del columns
     # loads what loads late, and its few samples leave the peak alone
     run_ours(inputs[:1000], outputs[:1000], n_hidden, OURS(n_iterations=2))
-    before = _status("VmRSS")
+    before = memory("VmRSS")
     run_ours(inputs, outputs, n_hidden, OURS(n_iterations=3))
     data = (inputs.nbytes + outputs.nbytes) / MEGABYTE
     # the peak is that of the process since its start: never less than what training took
-    return {"above_data_mb": _status("VmHWM") - before, "data_mb": data}
+    return {"above_data_mb": memory("VmHWM") - before, "data_mb": data}
 
 
 if __name__ == "__main__":

@@ -9,14 +9,15 @@ Needs `make repro` for data/crane. Writes reports/benchmarks/training_methods.cs
 the first start) and .md (all runs).
 """
 
+from machine import pinned_pool, remark
+
+# isort: split
 import itertools
-import os
 import sys
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -26,7 +27,6 @@ import pandas as pd
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 from training_data import ACTIVATION, SEED, case, crane_lesson
-from training_race import pinned_pool
 
 from flexik import stage
 from flexik.errors import DataError
@@ -177,7 +177,7 @@ def table(curves: Sequence[Curve]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def notes(curves: Sequence[Curve], rates: dict[str, float], load: tuple[float, float]) -> list[str]:
+def notes(curves: Sequence[Curve], rates: dict[str, float]) -> list[str]:
     """What the table means."""
     batch, pattern = (
         next(curve for curve in curves if (curve.label, curve.start) == (label, STARTS[0]))
@@ -205,21 +205,17 @@ def notes(curves: Sequence[Curve], rates: dict[str, float], load: tuple[float, f
         "best back-propagation': until the error is that with which the better mode ended from "
         "the same start. The curves beside this table are those from start "
         f"{STARTS[0]}, thinned to {N_ROWS} rows each at most.",
-        f"One core a run, {N_PROCESSES} runs at a time; numpy {version('numpy')}; load of the "
-        f"machine {load[0]:.1f} at the start, {load[1]:.1f} at the end, of which this benchmark is "
-        f"up to {N_PROCESSES}.",
+        remark(N_PROCESSES, "numpy"),
     ]
 
 
 def main() -> None:
     """Measure and report."""
-    # before the processes import NumPy
-    os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     try:
         crane_lesson(NETWORK)
     except DataError as error:
         raise DataError(f"run `make repro` first: {error}") from error
-    started, load = time.perf_counter(), os.getloadavg()[0]
+    started = time.perf_counter()
     with pinned_pool(N_PROCESSES) as pool:
         rates = chosen_rates(pool)
         futures = []
@@ -227,7 +223,7 @@ def main() -> None:
             options = _limited(rates[label], LIMIT) if label in RATES else {}
             futures.append(pool.submit(run, label, start, options))
         curves = [future.result() for future in futures]
-    remarks = notes(curves, rates, (load, os.getloadavg()[0]))
+    remarks = notes(curves, rates)
     caption = f"Training the {NETWORK} network with {N_HIDDEN} hidden neurons: error against time."
     text = markdown(table(curves), DECIMALS, caption, remarks)
     # one line for each trainer: a figure that joins two starts would mean nothing

@@ -5,6 +5,10 @@ mean square error. What is told to none of them keeps the default of its package
 imported here by name, for none of them but SciPy has to be installed.
 """
 
+import machine  # noqa: F401
+
+# isort: split
+import os
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,6 +22,10 @@ from scipy.optimize import least_squares
 from training_data import ACTIVATION, SEED, Array, Case, Watch
 
 from flexik.learning.weights import Weights, flatten, forward, unflatten
+
+# MKL's kernels that are the same everywhere are slow: torch, a peer, has those it would choose.
+# Our trainers in the races do without MKL
+os.environ.pop("MKL_CBWR", None)
 
 # large enough that no package stops for its own count
 ENDLESS = 10**9

@@ -1,15 +1,11 @@
 """Time to equal error from equal starts: this package beside the peers, one core each."""
 
+from machine import installed
+
+# isort: split
 import math
-import os
 import statistics
-import sys
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass, field
-from importlib.metadata import PackageNotFoundError, version
-from multiprocessing import get_context
 from typing import Any
 
 import training_data
@@ -81,14 +77,6 @@ class Runs:
     to_tight: list[float] = field(default_factory=list)
     best: list[float] = field(default_factory=list)
     remark: str = ""
-
-
-def installed(package: str) -> str | None:
-    """Version of `package`, or None."""
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 def run_race(race: Race) -> dict[str, Runs]:
@@ -168,21 +156,3 @@ def speedups(race: Race, runs: dict[str, Runs], target: str = "to_tight") -> lis
         fastest = min([race.limit, *(time for one in times for time in one)])
         ratios.append(fastest / own)
     return ratios
-
-
-@contextmanager
-def pinned_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
-    """Fresh processes with a core each; thread pools that ask for the cores find one."""
-    context = get_context("spawn")
-    cores = context.Queue()
-    available = sorted(os.sched_getaffinity(0)) if sys.platform == "linux" else []
-    for k in range(n_processes):
-        cores.put(available[k % len(available)] if available else None)
-    with ProcessPoolExecutor(n_processes, context, _pin, (cores,)) as pool:
-        yield pool
-
-
-def _pin(cores: Any) -> None:
-    core = cores.get()
-    if core is not None and sys.platform == "linux":
-        os.sched_setaffinity(0, {core})
