@@ -39,7 +39,7 @@ def lesson(given=None, n_hidden=4, settings=QUICK, seed=1, activation="tanh", **
     return Lesson(inputs, outputs, INPUTS, OUTPUTS, architecture, settings, seed, **others)
 
 
-NOISY = lesson(data(30, noise=0.1), 6, selection=data(25, seed=9))
+NOISY = lesson(data(30, noise=0.1), (6,), selection=data(25, seed=9))
 
 
 def settings_of(kind: str, **options) -> Stopping:

@@ -30,13 +30,14 @@ def fit(
     def finish(results: list[Columns]) -> Mapping[str, Writer]:
         runs = [unpacked(result) for result in results]
         network, record, records = best(lesson, runs)
+        table = restarts_csv(records, network.n_hidden)
         usable = [(found, made) for found, made in runs if found is not None]
         if finished is not None:
             network, usable = finished(network), [(finished(f), made) for f, made in usable]
         return {
             ".json": network_file([(network, record)]),
             ".restarts.json": network_file(usable),
-            ".restarts.csv": text_file(restarts_csv(records, lesson.architecture.n_hidden)),
+            ".restarts.csv": text_file(table),
         }
 
     return Work(functools.partial(_restart, lesson), range(n_restarts), finish)
