@@ -27,7 +27,7 @@ from flexik import stage
 from flexik.cases.case import load
 from flexik.cases.smartee.parts.errors import conditions_of
 from flexik.cases.smartee.parts.methods import trained
-from flexik.cases.smartee.parts.poses import SAMPLES, centre_elbows
+from flexik.cases.smartee.parts.poses import centre_elbows
 from flexik.cases.smartee.parts.train import lesson
 from flexik.cases.smartee.section import PREVIOUS, RANDOM
 from flexik.datasets.tables import read_table
@@ -59,7 +59,7 @@ def query() -> pd.DataFrame:
     ]
     try:
         methods = {label: trained(section, *label) for label in labels}
-        poses = read_table(SAMPLES / f"{RANDOM}.parquet")
+        poses = read_table(section.data / f"samples/{RANDOM}.parquet")
     except DataError as error:
         raise DataError(f"run `make repro` first: {error}") from error
     asked = conditions_of(poses, centre_elbows(section.machine, section.samples.box))
@@ -126,7 +126,7 @@ def run_both(run: tuple[str, str, int]) -> dict[str, object]:
     section = load("smartee")
     starts, (trainer, spread, start) = section.studies.starts, run
     settings = section.trainers[trainer]
-    rows = SAMPLES / f"{starts.poses}.parquet"
+    rows = section.data / f"samples/{starts.poses}.parquet"
     task = replace(
         lesson(Architecture(starts.n_hidden), settings, starts.seed, rows),
         spread=starts.spreads[spread],

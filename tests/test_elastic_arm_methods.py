@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from elastic_arm import GEOMETRY, HOME, MODEL, QUERY, SECTION, TARGETS, tips
 
+from flexik.cases import case as cases
 from flexik.cases.elastic_arm.parts import evaluate
 from flexik.cases.elastic_arm.parts.gauge_method import GaugeNetwork
 from flexik.cases.elastic_arm.parts.kinds import KINDS
@@ -94,7 +95,7 @@ def test_gauge_network_is_told_the_deformation_beside_the_target(learns, inputs)
 
 def test_a_gauge_method_is_told_what_its_network_learnt_from():
     told = {
-        label: evaluate.described(SECTION, "workspace", label)["inputs"].get("shown", "")
+        label: str(evaluate.described(SECTION, "workspace", label)["inputs"].get("shown", ""))
         for label in SECTION.methods
     }
     noisy = {"published_network_noisy", "gauges_elbow_lm_noisy"}
@@ -136,3 +137,10 @@ def far(query, current):
     """The stretched arm."""
     answer = near(query, current)
     return type(answer)(current, answer.status)
+
+
+def test_files_are_those_of_the_name_of_the_section():
+    other = SECTION.model_copy(update={"name": "other_arm"})
+    parts = [part for stage in cases.STAGES for part in cases.parts(other, stage)]
+    assert "elastic_arm" not in str([part.inputs for part in parts])
+    assert "data/other_arm/samples/readings.parquet" in str(parts[-1].inputs)

@@ -33,6 +33,7 @@ def project(tmp_path_factory):
     folder = tmp_path_factory.mktemp("project")
     given, profile = read_yaml(ROOT / "params.yaml"), read_yaml(ROOT / "profiles/smoke.yaml")
     data = {
+        "cases": {"elastic_arm": {"code": "elastic_arm"}},
         "trainers": overlay(given["trainers"], _known(profile["trainers"], given["trainers"])),
         "elastic_arm": overlay(overlay(given["elastic_arm"], profile["elastic_arm"]), SMALL),
     }
@@ -149,9 +150,9 @@ def test_sentences_follow_the_data(project, page, monkeypatch, tmp_path):
     easy = tmp_path / "fit.csv"
     easy.write_text(f"network,r_theta_1,r_theta_2\n{MAIN},-1.0,0.9999999\n")
     monkeypatch.setattr(report_results, "PUBLISHED", easy)
-    monkeypatch.setattr("flexik.cases.elastic_arm.report.REPORT", tmp_path / "report")
+    monkeypatch.setattr("flexik.parameters.section.REPORTS", tmp_path)
     report(project[1])
-    page = (tmp_path / "report/README.md").read_text()
+    page = (tmp_path / "elastic_arm/README.md").read_text()
     assert "Published R of theta_1, -1.000000: reached by the main division" in page
     assert "reached in 2 of 2" in page and "reached in 0 of 2" in page
 

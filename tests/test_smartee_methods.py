@@ -6,6 +6,7 @@ import pytest
 from smartee_case import small
 from test_smartee_poses import draw, rows
 
+from flexik.cases import case as cases
 from flexik.cases.smartee.parts.errors import COLUMNS, angle, conditions_of, errors, judge_of
 from flexik.cases.smartee.parts.evaluate import largest
 from flexik.cases.smartee.parts.methods import DirectKinematics, network_file, trained
@@ -182,8 +183,14 @@ def test_peaks_of_all_restarts_are_those_of_their_networks(records, tmp_path):
 
 
 def test_methods_are_found_by_name():
-    assert network_file(SMARTEE.methods["newton"]) is None
-    assert str(network_file(SMARTEE.methods["best"])) == "data/smartee/networks/best.json"
+    assert network_file(SMARTEE, SMARTEE.methods["newton"]) is None
+    assert str(network_file(SMARTEE, SMARTEE.methods["best"])) == "data/smartee/networks/best.json"
     assert trained(SMARTEE, "centre", 3) == DirectKinematics(GEOMETRY, "centre", 3)
     with pytest.raises(ParameterError, match="no 'centre' of 99 steps"):
         trained(SMARTEE, "centre", 99)
+
+
+def test_files_are_those_of_the_name_of_the_section():
+    other = SMARTEE.model_copy(update={"name": "other"})
+    inputs = [part.inputs for stage in cases.STAGES for part in cases.parts(other, stage)]
+    assert "smartee" not in str(inputs) and "data/other/networks/best.json" in str(inputs)

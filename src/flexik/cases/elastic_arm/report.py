@@ -12,7 +12,7 @@ from flexik.cases.elastic_arm.parts.gauges import FREE_OF_NOISE, NOISY
 from flexik.cases.elastic_arm.parts.kinds import KINDS
 from flexik.cases.elastic_arm.parts.readings import ANGLES, TRAINING
 from flexik.cases.elastic_arm.report_figures import figures, shown_networks
-from flexik.cases.elastic_arm.report_results import DATA, NEAR, PUBLISHED, R, Results, chosen, of
+from flexik.cases.elastic_arm.report_results import NEAR, PUBLISHED, R, Results, chosen
 from flexik.cases.elastic_arm.section import Section
 from flexik.files import read_json
 from flexik.kinematics.elastic_arm import DEFORMATION
@@ -21,17 +21,16 @@ from flexik.reporting.report import Content, made_from, write_report
 from flexik.reporting.style import MICRO, MM
 from flexik.reporting.tables import Column, Table, mm, table
 
-REPORT = Path("reports/elastic_arm")
 NOTHING = "nothing"
 
 
 def report(section: Section) -> None:
-    """Write reports/elastic_arm from data/elastic_arm."""
+    """Write reports/NAME from data/NAME."""
     results = Results(section)
     content = Content(tables(results), figures(results), metrics(results), values(results))
-    sources, record = made_from(section, [PUBLISHED]), DATA / "report.json"
+    sources, record = made_from(section, [PUBLISHED]), section.data / "report.json"
     template = Path(__file__).with_name("page.md.j2")
-    write_report(REPORT, template, content, sources=sources, record=record)
+    write_report(section.report, template, content, sources=sources, record=record)
 
 
 def metrics(results: Results) -> dict[str, float | None]:
@@ -56,7 +55,7 @@ def metrics(results: Results) -> dict[str, float | None]:
                 title = titles.get(which, which)
                 found[f"{label}.{title}_mm"] = round(MM * row[which], 4)
         found[f"{label}.n_failed"] = int(row["n_failed"])
-    for changed, error in sensitivity(results.main).drop(NOTHING).items():
+    for changed, error in sensitivity(results, results.main).drop(NOTHING).items():
         found[f"{results.main}.{changed}_off_mean_error_mm"] = round(MM * error, 4)
     for k, r in enumerate(R, start=1):
         found[f"splits.median_r_theta{k}"] = round(results.splits[r].median(), 6)
@@ -64,7 +63,7 @@ def metrics(results: Results) -> dict[str, float | None]:
     for name in selected(results):
         for k, n in enumerate(results.layers(name), start=1):
             found[f"select.{name}.n_hidden_{k}"] = n
-    parts = of("samples/readings")["part"].value_counts().sort_index()
+    parts = results.of("samples/readings")["part"].value_counts().sort_index()
     return found | {f"readings.n_{part}": int(n) for part, n in parts.items()}
 
 
@@ -89,7 +88,7 @@ def tables(results: Results) -> dict[str, Table]:
         "mean tip error by restart (mm)": "mean_errors",
     }
     runs = {
-        name: pd.read_csv(DATA / f"networks/{name}.restarts.csv").assign(
+        name: pd.read_csv(results.section.data / f"networks/{name}.restarts.csv").assign(
             hidden=results.hidden(name)
         )
         for name in results.section.networks
@@ -98,13 +97,13 @@ def tables(results: Results) -> dict[str, Table]:
     front = ["network", "hidden", "restart"]
     training = training[[*front, *(name for name in training if name not in front)]]
     return {
-        "sensitivity": sensitivity_table(),
+        "sensitivity": sensitivity_table(results),
         "positioning_errors": positioning_table(results),
         "fit": table(results.fits.reset_index(), fit_columns),
         "splits": splits_table(results),
         "gauges": gauges_table(results),
         "training": Table(training, {"training_error": 6, "selection_error": 6}),
-        **{f"size_selection/{name}": size_table(name) for name in selected(results)},
+        **{f"size_selection/{name}": size_table(results, name) for name in selected(results)},
     }
 
 
@@ -144,17 +143,17 @@ def splits_table(results: Results) -> Table:
     return table(rows, {"division": "division", "seed": "seed", **titles})
 
 
-def sensitivity(name: str) -> pd.Series:
+def sensitivity(results: Results, name: str) -> pd.Series:
     """Mean tip error in m of a network by the input that is off."""
-    rows = chosen(of("studies/sensitivity"))
+    rows = chosen(results.of("studies/sensitivity"))
     return rows[rows["network"] == name].set_index("input")["mean_error"]
 
 
-def sensitivity_table() -> Table:
+def sensitivity_table(results: Results) -> Table:
     """Mean tip errors in mm by input and network, and by how much the input is off."""
-    rows = chosen(of("studies/sensitivity"))
+    rows = chosen(results.of("studies/sensitivity"))
     off = rows.groupby("input", sort=False)["change"].first()
-    by_network = {name: MM * sensitivity(name) for name in dict.fromkeys(rows["network"])}
+    by_network = {name: MM * sensitivity(results, name) for name in dict.fromkeys(rows["network"])}
     frame = pd.DataFrame({"off by (um, urad)": MICRO * off, **by_network}).loc[off.index]
     return Table(frame.rename_axis("input that is off").reset_index(), 3)
 
@@ -162,7 +161,7 @@ def sensitivity_table() -> Table:
 def gauges_table(results: Results) -> Table:
     """Deformation by the gauges minus that of the model, over all readings, mm and mrad."""
     names = list(DEFORMATION)
-    model = of("samples/readings")[names]
+    model = results.of("samples/readings")[names]
     frame = pd.DataFrame({"variable": names}, index=names)
     frame["unit"] = ["mrad" if name.startswith("dphi") else "mm" for name in names]
     frame["largest, model"] = MM * model.abs().max()
@@ -181,9 +180,9 @@ def selected(results: Results) -> list[str]:
     return [name for name, network in results.section.networks.items() if network.is_selected]
 
 
-def size_table(name: str) -> Table:
+def size_table(results: Results, name: str) -> Table:
     """Errors of every size of a study."""
-    sizes = by_size(of(f"sizes/{name}"))
+    sizes = by_size(results.of(f"sizes/{name}"))
     counts = [c for c in sizes if str(c).startswith(("n_", "best_"))]
     errors = [str(c) for c in sizes if str(c).endswith("_error")]
     return Table(sizes.astype(dict.fromkeys(counts, int)), dict.fromkeys(errors, 6))
@@ -191,7 +190,8 @@ def size_table(name: str) -> Table:
 
 def values(results: Results) -> dict[str, Any]:
     """What the sentences of the page hold."""
-    section, exact, readings = results.section, results.shown(FREE_OF_NOISE), of("samples/readings")
+    section, exact = results.section, results.shown(FREE_OF_NOISE)
+    readings = results.of("samples/readings")
     voltages = exact.filter(like="voltage").to_numpy()
     tip = readings[["tip_x", "tip_y"]].to_numpy()
     used = {network.trainer for network in section.networks.values()}
@@ -200,7 +200,7 @@ def values(results: Results) -> dict[str, Any]:
         "section": section,
         "given": section.machine.gauges,
         "main": results.main,
-        "counts": read_json(DATA / f"samples/{results.conditions}.json"),
+        "counts": read_json(section.data / f"samples/{results.conditions}.json"),
         "n_of_part": readings["part"].value_counts().to_dict(),
         "dx": [exact[f"dx_{link}"].abs().max() for link in (1, 2)],
         "strain": [exact[f"strain_{link}"].abs().max() for link in (1, 2)],
@@ -237,7 +237,7 @@ def alike(results: Results, *keys: str) -> list[str]:
 
 def sensitivity_values(results: Results) -> dict[str, Any]:
     """The input that the published network depends on most, and which noise costs it more."""
-    off, rows = sensitivity(results.main), of("studies/sensitivity")
+    off, rows = sensitivity(results, results.main), results.of("studies/sensitivity")
     worst = str(off.drop(NOTHING).idxmax())
     rows = rows[(rows["network"] == results.main) & (rows["input"] == worst)]
     same = alike(results, "trainer", "n_hidden", "learns")
@@ -269,10 +269,10 @@ def depths(results: Results) -> dict[str, Any]:
 
 def size_values(results: Results, name: str) -> dict[str, Any]:
     """Whether the choice is on the border, and how near to more weights than numbers."""
-    runs, kind = of(f"sizes/{name}"), KINDS[str(results.section.networks[name].learns)]
+    runs, kind = results.of(f"sizes/{name}"), KINDS[str(results.section.networks[name].learns)]
     sizes, tried = results.layers(name), runs.filter(like="n_hidden").max()
     pairs = itertools.pairwise((len(kind.inputs), *sizes, len(kind.outputs)))
-    n_training = int((of("samples/readings")["part"] == TRAINING).sum())
+    n_training = int((results.of("samples/readings")["part"] == TRAINING).sum())
     return {
         "select": results.section.networks[name].select,
         "n_goal": int((runs["stop_reason"] == "goal").sum()),

@@ -8,7 +8,6 @@ import pandas as pd
 from flexik.cases.elastic_arm.parts.gauges import FREE_OF_NOISE, NOISY
 from flexik.cases.elastic_arm.parts.readings import ANGLES, HELD_OUT
 from flexik.cases.elastic_arm.report_results import R, Results
-from flexik.cases.elastic_arm.report_results import of as table_of
 from flexik.reporting import kinds, plane, style
 from flexik.reporting.chart import Axis, Layer, chart
 from flexik.reporting.report import Drawing, draw
@@ -62,7 +61,7 @@ def deformation(results: Results, link: int) -> Drawing:
     without noise.
     """
     # at 0 no force acts along link 1
-    readings = table_of("samples/readings")
+    readings = results.of("samples/readings")
     rows = np.isclose(readings["theta_1"], readings["theta_1"].max())
     readings = readings[rows]
     exact, noisy = (results.shown(noise)[rows] for noise in (FREE_OF_NOISE, NOISY))

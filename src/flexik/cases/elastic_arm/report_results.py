@@ -17,7 +17,6 @@ from flexik.evaluation.regression import correlation
 from flexik.learning.size_selection import read_layers
 from flexik.reporting.style import MM
 
-DATA = Path("data/elastic_arm")
 PUBLISHED = Path("data/reference/elastic_arm/fit.csv")
 # Nearer than this to the payload of a reading, a target's payload was learnt from, kg
 NEAR = 0.1
@@ -33,11 +32,6 @@ KNOWS = {
 EXTRA = {"gauges_without_dx": ", without dx", "gauges_elbow": ", and elbow"}
 
 table = functools.cache(read_table)
-
-
-def of(name: str) -> pd.DataFrame:
-    """Table data/elastic_arm/NAME.parquet."""
-    return table(DATA.absolute() / f"{name}.parquet")
 
 
 def chosen(frame: pd.DataFrame) -> pd.DataFrame:
@@ -66,14 +60,18 @@ class Results:
         """Name of the set of conditions."""
         return next(iter(self.section.conditions))
 
+    def of(self, name: str) -> pd.DataFrame:
+        """Table data/SECTION/NAME.parquet."""
+        return table(self.section.data.absolute() / f"{name}.parquet")
+
     def shown(self, noise: str) -> pd.DataFrame:
         """What gauges show in the readings."""
-        return of(f"samples/readings.{noise}")
+        return self.of(f"samples/readings.{noise}")
 
     def layers(self, name: str) -> tuple[int, ...]:
         """Units of the hidden layers of a network, given or chosen."""
-        network = self.section.networks[name]
-        return read_layers(DATA / f"sizes/{name}.json") if network.is_selected else network.sizes[0]
+        network, chosen = self.section.networks[name], self.section.data / f"sizes/{name}.json"
+        return read_layers(chosen) if network.is_selected else network.sizes[0]
 
     def hidden(self, name: str) -> str:
         """The same as the paper writes them, 12-40."""
@@ -81,14 +79,16 @@ class Results:
 
     def joined(self, name: str) -> pd.DataFrame:
         """Readings with what the gauges show and what network `name` says, a row each."""
-        shown, fit = self.shown(self.section.networks[name].readings), of("studies/fit")
+        shown, fit = self.shown(self.section.networks[name].readings), self.of("studies/fit")
         fit = fit[fit["network"] == name].set_index("reading").drop(columns="network")
-        return pd.concat([of("samples/readings"), shown[["p_x", "p_y"]], fit], axis=1)
+        return pd.concat([self.of("samples/readings"), shown[["p_x", "p_y"]], fit], axis=1)
 
     @functools.cached_property
     def errors(self) -> dict[str, pd.DataFrame]:
         """Long tables of the methods at the random targets; n_clipped among the columns."""
-        tables = {label: of(f"errors/{self.conditions}/{label}") for label in self.section.methods}
+        tables = {
+            label: self.of(f"errors/{self.conditions}/{label}") for label in self.section.methods
+        }
         return {k: frame.assign(n_clipped=frame.get("n_clipped", 0)) for k, frame in tables.items()}
 
     @functools.cached_property
@@ -98,7 +98,7 @@ class Results:
         targets_: R at the random targets, NaN where no method takes the network or its angles do
         not vary; worst_, best_: of all restarts.
         """
-        every, published = of("studies/fit.restarts"), read_csv(PUBLISHED, R, ("network",))
+        every, published = self.of("studies/fit.restarts"), read_csv(PUBLISHED, R, ("network",))
         rows = chosen(every).set_index("network").loc[list(self.section.gauge_networks)]
         rows = rows.join(published.set_index("network")[R].add_prefix("published_"))
         least, most = (getattr(every.groupby("network")[R], which)() for which in ("min", "max"))
@@ -114,7 +114,7 @@ class Results:
             by_restart(every.loc[every["network"] == name, "mean_error"], 2) for name in rows.index
         ]
         rows[[f"targets_{r}" for r in R]] = np.nan
-        right = of(f"samples/{self.conditions}")[list(ANGLES)].to_numpy()
+        right = self.of(f"samples/{self.conditions}")[list(ANGLES)].to_numpy()
         for label, method in self.section.methods.items():
             found = self.errors[label][list(ANGLES)].to_numpy()
             if method.method == "gauges" and np.ptp(found, axis=0).all():
@@ -135,7 +135,7 @@ class Results:
             row |= {"far": error[~near].mean(), "knows": "target"}
             if method.network is not None:
                 network = self.section.networks[method.network]
-                restarts = of(f"errors/{self.conditions}/{label}.restarts")
+                restarts = self.of(f"errors/{self.conditions}/{label}.restarts")
                 row["knows"] = KNOWS.get(str(network.learns), "target, payload")
                 row["gauges"] = network.readings.replace("_", "-") if network.has_gauges else ""
                 row |= {"hidden": self.hidden(method.network), "trainer": network.trainer}
@@ -144,7 +144,7 @@ class Results:
                 row["worst_mean_error"] = restarts["mean_error"].max()
                 row["worst_max_error"] = restarts["max_error"].max()
             rows[label] = row
-        told = of("studies/payload_error").set_index("method")["mean_error"]
+        told = self.of("studies/payload_error").set_index("method")["mean_error"]
         return pd.DataFrame.from_dict(rows, orient="index").assign(told=told)
 
     @property
@@ -156,11 +156,11 @@ class Results:
     def splits(self) -> pd.DataFrame:
         """R of the published network by every division, the main one first."""
         first = {"seed": self.section.samples.seed, **self.fits.loc[self.main, R]}
-        return pd.concat([pd.DataFrame([first]), of("studies/splits")], ignore_index=True)
+        return pd.concat([pd.DataFrame([first]), self.of("studies/splits")], ignore_index=True)
 
     def on_border(self) -> int:
         """Number of held-out readings on the border of the grid of angles."""
-        readings = of("samples/readings")
+        readings = self.of("samples/readings")
         angles = readings[list(ANGLES)].to_numpy()
         ends = np.isclose(angles, angles.min(axis=0)) | np.isclose(angles, angles.max(axis=0))
         return int(ends.any(axis=1)[readings["part"] == HELD_OUT].sum())

@@ -1,4 +1,4 @@
-"""The section `elastic_arm` of params.yaml, and the machine file beside it."""
+"""The section of an elastic two-link arm in params.yaml, and the machine file beside it."""
 
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
@@ -297,7 +297,7 @@ def check(section: Section) -> None:
         x, y = np.meshgrid(np.linspace(*drawn.x, 50), np.linspace(*drawn.y, 50))
         targets = np.column_stack([x.ravel(), y.ravel()])
         if not (geometry.inverse(targets, np.zeros_like(targets)).status == REACHED).any():
+            key = f"{section.name}.conditions.{name}.x"
             raise ParameterError(
-                f"params.yaml: elastic_arm.conditions.{name}.x: the rigid arm reaches nothing of "
-                "the area of x and y"
+                f"params.yaml: {key}: the rigid arm reaches nothing of the area of x and y"
             )

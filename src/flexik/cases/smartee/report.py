@@ -11,10 +11,11 @@ TEMPLATE = Path(__file__).with_name("page.md.j2")
 
 
 def report(section: Section) -> None:
-    """Write reports/smartee from data/smartee."""
-    folder, record = Path("reports/smartee"), Path("data/smartee/report.json")
+    """Write reports/NAME from data/NAME."""
     sources = made_from(section, [PUBLISHED_FILE])
-    write_report(folder, TEMPLATE, content(read(section)), sources=sources, record=record)
+    record = section.data / "report.json"
+    found = content(read(section))
+    write_report(section.report, TEMPLATE, found, sources=sources, record=record)
 
 
 def content(results: Results) -> Content:

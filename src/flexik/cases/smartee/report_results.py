@@ -16,7 +16,7 @@ from flexik.files import read_json
 from flexik.learning.size_selection import by_size
 from flexik.reporting.style import MM, require
 
-DATA, BENCHMARKS = Path("data/smartee"), Path("reports/benchmarks")
+BENCHMARKS = Path("reports/benchmarks")
 PUBLISHED_FILE = Path("data/reference/smartee/peaks.csv")
 # Errors by the name they have in metrics and in the file of published peaks
 QUANTITIES = {"elbow": "error", "position": "position_error", "orientation": "orientation_error"}
@@ -81,14 +81,15 @@ class Results:
 
 def read(section: Section) -> Results:
     """Read what the stages and the benchmarks left; raises DataError if something is missing."""
+    data = section.data
     errors = {
-        (name, conditions): read_table(DATA / "errors" / conditions / f"{name}.parquet")
+        (name, conditions): read_table(data / "errors" / conditions / f"{name}.parquet")
         for name, method in section.methods.items()
         for conditions in method.conditions or section.conditions
     }
-    training = {name: pd.read_csv(DATA / f"networks/{name}.restarts.csv") for name in GOALS}
-    restarts = {name: read_table(DATA / "errors" / RESTARTS / f"{name}.parquet") for name in GOALS}
-    studies, sizes = DATA / "studies", section.studies.sizes.poses
+    training = {name: pd.read_csv(data / f"networks/{name}.restarts.csv") for name in GOALS}
+    restarts = {name: read_table(data / "errors" / RESTARTS / f"{name}.parquet") for name in GOALS}
+    studies, sizes = data / "studies", section.studies.sizes.poses
     by = {poses: by_size(read_table(studies / f"sizes_{poses}.parquet")) for poses in sizes}
     return Results(
         section=section,

@@ -1,4 +1,4 @@
-"""The section `smartee` of params.yaml, and data/machines/smartee.yaml."""
+"""The section of a SmartEE in params.yaml, and the machine file beside it."""
 
 from collections.abc import Iterator
 from typing import Annotated, Literal, Self

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flexik.cases.elastic_arm.parts.arm import flexible_arm
 from flexik.cases.elastic_arm.parts.gauge_method import GaugeNetwork
 from flexik.cases.elastic_arm.parts.kinds import KINDS
-from flexik.cases.elastic_arm.parts.readings import FIELDS, SAMPLES
+from flexik.cases.elastic_arm.parts.readings import FIELDS
 from flexik.cases.elastic_arm.parts.trained import RESTART, Trained, files_of, restarts
 from flexik.cases.elastic_arm.section import Gauge, Machine, Network, Section
 from flexik.datasets.parts import Part, Work, Writer, stacked, table
@@ -47,14 +47,14 @@ def parts(section: Section) -> list[Part]:
 
 def described(section: Section, conditions: str, label: str) -> dict[str, dict[str, Any]]:
     """Settings and inputs of a method on a set of conditions."""
-    method = section.methods[label]
+    method, samples = section.methods[label], section.data / "samples"
     settings: dict[str, Any] = {"machine": section.machine, "method": method}
-    inputs: dict[str, Any] = {"targets": f"{SAMPLES}/{conditions}.parquet"}
+    inputs: dict[str, Any] = {"targets": samples / f"{conditions}.parquet"}
     if method.network is not None:
         network = section.networks[method.network]
-        settings["network"], inputs["files"] = network, files_of(method.network)
+        settings["network"], inputs["files"] = network, files_of(section, method.network)
         if network.has_gauges:
-            inputs["shown"] = f"{SAMPLES}/{conditions}.{network.readings}.parquet"
+            inputs["shown"] = samples / f"{conditions}.{network.readings}.parquet"
     settings["build"] = gauge_method if isinstance(method, Gauge) else registry.build_of(method)
     return {"settings": settings, "inputs": inputs}
 

@@ -34,13 +34,11 @@ MAXIMUM_CANDIDATES = 20
 def parts(section: Section) -> list[Part]:
     """Tables `readings` and, by name of the conditions, of targets; `.NOISE.parquet` of gauges."""
     settings = {"machine": section.machine, "samples": section.samples}
-    return [
-        Part("readings", prepare_readings, settings),
-        *(
-            Part(name, prepare_targets, {**settings, "name": name, "workspace": workspace})
-            for name, workspace in section.conditions.items()
-        ),
-    ]
+    found = [Part("readings", prepare_readings, settings)]
+    for name, workspace in section.conditions.items():
+        own = {"key": f"{section.name}.conditions.{name}", "workspace": workspace}
+        found.append(Part(name, prepare_targets, settings | own))
+    return found
 
 
 def prepare_readings(*, machine: Machine, samples: Samples) -> Work:
@@ -49,10 +47,10 @@ def prepare_readings(*, machine: Machine, samples: Samples) -> Work:
 
 
 def prepare_targets(
-    *, machine: Machine, samples: Samples, name: str, workspace: RandomTargets
+    *, machine: Machine, samples: Samples, key: str, workspace: RandomTargets
 ) -> Work:
     """Random targets and payloads that the loaded arm can be put on, and how many were drawn."""
-    return whole(_targets, machine=machine, samples=samples, name=name, workspace=workspace)
+    return whole(_targets, machine=machine, samples=samples, key=key, workspace=workspace)
 
 
 def _readings(machine: Machine, samples: Samples) -> dict[str, Writer]:
@@ -82,7 +80,7 @@ def _shown(
 
 
 def _targets(
-    machine: Machine, samples: Samples, name: str, workspace: RandomTargets
+    machine: Machine, samples: Samples, key: str, workspace: RandomTargets
 ) -> dict[str, Writer]:
     arm, generator = flexible_arm(machine), np.random.default_rng(workspace.seed)
     wanted, n_drawn, n_found = workspace.n_targets, 0, 0
@@ -90,7 +88,7 @@ def _targets(
     while n_found < wanted:
         if n_drawn >= MAXIMUM_CANDIDATES * wanted:
             raise ParameterError(
-                f"elastic_arm.conditions.{name}: of {n_drawn} targets drawn in x, y only {n_found} "
+                f"{key}: of {n_drawn} targets drawn in x, y only {n_found} "
                 f"are reached, expected {wanted}"
             )
         n_drawn += wanted

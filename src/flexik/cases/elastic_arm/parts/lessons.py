@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 from flexik.cases.elastic_arm.parts.kinds import KINDS, LearningData, learning_data
-from flexik.cases.elastic_arm.parts.readings import SAMPLES
 from flexik.cases.elastic_arm.section import Network, Section
 from flexik.learning.perceptron import quantities
 from flexik.learning.training import Architecture, Lesson
@@ -13,11 +12,11 @@ from flexik.parameters.trainers import Stopping
 
 def described(section: Section, name: str, trainer: str) -> dict[str, dict[str, Any]]:
     """Settings and inputs of what trains network `name` by `trainer`."""
-    network = section.networks[name]
-    shown = f"{SAMPLES}/readings.{network.readings}.parquet"
+    network, samples = section.networks[name], section.data / "samples"
+    shown = samples / f"readings.{network.readings}.parquet"
     return {
         "settings": {"network": network, "trainer": section.trainers[trainer]},
-        "inputs": {"readings": f"{SAMPLES}/readings.parquet", "shown": shown},
+        "inputs": {"readings": samples / "readings.parquet", "shown": shown},
     }
 
 

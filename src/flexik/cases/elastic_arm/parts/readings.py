@@ -10,7 +10,6 @@ from flexik.datasets.tables import Field
 
 Array = NDArray[np.float64]
 
-SAMPLES = "data/elastic_arm/samples"
 TRAINING, SELECTION, HELD_OUT = "training", "selection", "held_out"
 ANGLES = ("theta_1", "theta_2")
 

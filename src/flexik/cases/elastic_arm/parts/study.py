@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from flexik.cases.elastic_arm.parts import evaluate, gauges, study_splits
-from flexik.cases.elastic_arm.parts.readings import SAMPLES
 from flexik.cases.elastic_arm.parts.study_gauges import prepare_fit, prepare_sensitivity
 from flexik.cases.elastic_arm.parts.trained import Trained, files_of
 from flexik.cases.elastic_arm.section import Gauge, Section
@@ -61,10 +60,11 @@ def _gauge_part(
         "machine": section.machine,
         "networks": {network: section.networks[network] for network in networks},
     }
+    samples = section.data / "samples"
     inputs = {
-        "readings": f"{SAMPLES}/readings.parquet",
-        "shown": {s: f"{SAMPLES}/readings.{s}.parquet" for s in gauges.SHOWN},
-        "files": {network: files_of(network) for network in networks},
+        "readings": samples / "readings.parquet",
+        "shown": {s: samples / f"readings.{s}.parquet" for s in gauges.SHOWN},
+        "files": {network: files_of(section, network) for network in networks},
     }
     return Part(name, prepare, common | settings, inputs)
 

@@ -9,16 +9,15 @@ from flexik.learning.fit import fit
 from flexik.learning.size_selection import read_layers
 from flexik.parameters.trainers import Stopping
 
-SIZES = "data/elastic_arm/sizes"
-
 
 def parts(section: Section) -> list[Part]:
     """A part a network; of one whose size is chosen, the choice is an input."""
     found = []
     for name, network in section.networks.items():
         of = described(section, name, network.trainer)
-        inputs = of["inputs"] | ({"size": f"{SIZES}/{name}.json"} if network.is_selected else {})
-        found.append(Part(name, prepare, of["settings"], inputs))
+        if network.is_selected:
+            of["inputs"]["size"] = section.data / f"sizes/{name}.json"
+        found.append(Part(name, prepare, **of))
     return found
 
 

@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.cases.elastic_arm.section import Network
+from flexik.cases.elastic_arm.section import Network, Section
 from flexik.datasets.tables import Field
 from flexik.learning import perceptron
 from flexik.learning.storage import load_network, load_restarts
 
-NETWORKS = "data/elastic_arm/networks"
 NETWORK = Field("network", "1", "name of the network", "string")
 RESTART = (
     Field("restart", "1", "number of the start, from 0", "int64"),
@@ -45,9 +44,10 @@ class Trained:
         }
 
 
-def files_of(name: str) -> dict[str, str]:
+def files_of(section: Section, name: str) -> dict[str, Path]:
     """Files of network `name`, as inputs of a part."""
-    return {"chosen": f"{NETWORKS}/{name}.json", "all": f"{NETWORKS}/{name}.restarts.json"}
+    networks = section.data / "networks"
+    return {"chosen": networks / f"{name}.json", "all": networks / f"{name}.restarts.json"}
 
 
 def restarts(name: str, settings: Network, files: Mapping[str, Path]) -> list[Trained]:

@@ -11,7 +11,6 @@ from flexik.cases.smartee.parts.poses import (
     ACTUATED_FIELDS,
     ELBOW_FIELDS,
     POSE_FIELDS,
-    SAMPLES,
     actuated_of,
     centre_elbows,
     extent_of,
@@ -46,18 +45,17 @@ RESTART_FIELDS = (
 def parts(section: Section) -> list[Part]:
     """Parts CONDITIONS/METHOD, and restarts/NETWORK."""
     shared = {"machine": section.machine, "box": section.samples.box}
-    found = []
+    found, data = [], section.data
     for name, settings in section.methods.items():
-        file = network_file(settings)
+        file = network_file(section, settings)
         network = {} if file is None else {"network": file}
         for conditions in settings.conditions or section.conditions:
-            inputs = {"rows": SAMPLES / f"{conditions}.parquet", **network}
+            inputs = {"rows": data / f"samples/{conditions}.parquet", **network}
             given = {**shared, "settings": settings}
             found.append(Part(f"{conditions}/{name}", prepare_errors, given, inputs))
-    rows = {name: SAMPLES / f"{name}.parquet" for name in (VALIDATION, RANDOM, CORNERS)}
+    rows = {name: data / f"samples/{name}.parquet" for name in (VALIDATION, RANDOM, CORNERS)}
     for name in section.networks:
-        restarts = f"data/smartee/networks/{name}.restarts.json"
-        files = {"restarts": restarts, "rows": rows}
+        files = {"restarts": data / f"networks/{name}.restarts.json", "rows": rows}
         found.append(
             Part(f"{RESTARTS}/{name}", prepare_restarts, {"machine": section.machine}, files)
         )

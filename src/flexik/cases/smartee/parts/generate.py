@@ -1,6 +1,6 @@
 """Poses of the SmartEE to learn from and to judge by."""
 
-from flexik.cases.smartee.parts.poses import FIELDS, table
+from flexik.cases.smartee.parts.poses import FIELDS, sets_of, table
 from flexik.cases.smartee.section import Box, Machine, Poses, Section
 from flexik.datasets import parts as engine
 from flexik.datasets.parts import Part, Work, Writer, whole
@@ -8,13 +8,10 @@ from flexik.datasets.parts import Part, Work, Writer, whole
 
 def parts(section: Section) -> list[Part]:
     """A part a set of poses, of the samples and of the conditions."""
-    sets = {
-        f"smartee.samples.poses.{name}": poses for name, poses in section.samples.poses.items()
-    } | {f"smartee.conditions.{name}": poses for name, poses in section.conditions.items()}
     shared = {"machine": section.machine, "box": section.samples.box}
     return [
         Part(key.rpartition(".")[2], prepare, {**shared, "poses": poses, "key": key})
-        for key, poses in sets.items()
+        for key, poses in sets_of(section).items()
     ]
 
 

@@ -74,18 +74,18 @@ def method(
     return DirectKinematics(geometry, start, n_steps, settings.tolerance, settings.accepted)
 
 
-def network_file(settings: section.Method) -> Path | None:
+def network_file(chosen: Section, settings: section.Method) -> Path | None:
     """File of the network a method starts from, if any."""
     if settings.start in (section.CENTRE, section.PREVIOUS):
         return None
-    return Path(f"data/smartee/networks/{settings.start}.json")
+    return chosen.data / f"networks/{settings.start}.json"
 
 
 def trained(chosen: Section, name: str, n_steps: int) -> DirectKinematics:
     """Method `name` with `n_steps`; raises FlexikError if there is none, or no network yet."""
     if name not in chosen.methods or n_steps not in chosen.methods[name].n_steps:
-        raise ParameterError(f"smartee.methods: there is no {name!r} of {n_steps} steps")
+        raise ParameterError(f"{chosen.name}.methods: there is no {name!r} of {n_steps} steps")
     settings = chosen.methods[name]
-    file = network_file(settings)
+    file = network_file(chosen, settings)
     network = None if file is None else load_network(file)[0]
     return method(chosen.machine, settings, n_steps, network)

@@ -1,7 +1,6 @@
 """Poses of the SmartEE and the joint angles that belong to them: what is learnt and judged by."""
 
 import itertools
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -23,7 +22,6 @@ from flexik.kinematics.status import REACHED
 
 Array = NDArray[np.float64]
 
-SAMPLES = Path("data/smartee/samples")
 POSE_FIELDS = (
     Field("x", "m", "position of the plate's centre"),
     Field("y", "m", "position of the plate's centre"),
@@ -140,23 +138,24 @@ def images(joints: Array) -> Array:
 
 
 def centre_elbows(machine: Machine, box: Box) -> Array:
-    """Elbows (3,) at the centre of the box, the plate level; ParameterError when out of reach."""
-    found = inverse(geometry_of(machine), np.array([box.centre]), np.eye(3)[None])
-    if found.status[0] != REACHED:
-        raise ParameterError("params.yaml: smartee.samples.box.centre: the legs do not reach it")
-    return found.joints[0, :, 2]
+    """Elbows (3,) at the centre of the box, the plate level; NaN when out of reach."""
+    return inverse(geometry_of(machine), np.array([box.centre]), np.eye(3)[None]).joints[0, :, 2]
+
+
+def sets_of(section: Section) -> dict[str, Poses]:
+    """All sets of poses by their key in params.yaml."""
+    samples = {f"{section.name}.samples.poses.{k}": v for k, v in section.samples.poses.items()}
+    return samples | {f"{section.name}.conditions.{k}": v for k, v in section.conditions.items()}
 
 
 def check_reach(section: Section) -> None:
     """Raise ParameterError when the legs do not reach the box's centre, or a pose of a set."""
     box = section.samples.box
-    centre_elbows(section.machine, box)
-    sets: dict[str, Poses] = {
-        f"samples.poses.{name}": poses for name, poses in section.samples.poses.items()
-    }
-    sets |= {f"conditions.{name}": poses for name, poses in section.conditions.items()}
-    for key, poses in sets.items():
-        reached(section.machine, box, poses, f"params.yaml: smartee.{key}")
+    if np.isnan(centre_elbows(section.machine, box)).any():
+        key = f"{section.name}.samples.box.centre"
+        raise ParameterError(f"params.yaml: {key}: the legs do not reach it")
+    for key, poses in sets_of(section).items():
+        reached(section.machine, box, poses, f"params.yaml: {key}")
 
 
 def values(rows: pd.DataFrame, fields: tuple[Field, ...]) -> Array:

@@ -1,7 +1,6 @@
 """Studies of the SmartEE, each in a module of its own, so that none depends on another's code."""
 
 from flexik.cases.smartee.parts.geometries import prepare_geometries
-from flexik.cases.smartee.parts.poses import SAMPLES
 from flexik.cases.smartee.parts.sizes import prepare_sizes
 from flexik.cases.smartee.parts.starts import prepare_linear, prepare_starts
 from flexik.cases.smartee.section import RANDOM, SELECTION, VALIDATION, Section, Sensitivity
@@ -13,9 +12,10 @@ def parts(section: Section) -> list[Part]:
     """Parts starts_TRAINER, sensitivity, linear, sizes_POSES and geometries."""
     studies, trainers = section.studies, section.trainers
     starts, sensitivity, sizes = studies.starts, studies.sensitivity, studies.sizes
-    rows = {name: SAMPLES / f"{name}.parquet" for name in section.samples.poses}
-    random = SAMPLES / f"{RANDOM}.parquet"
-    inputs = {"rows": rows[starts.poses], "judged": SAMPLES / f"{VALIDATION}.parquet"}
+    samples = section.data / "samples"
+    rows = {name: samples / f"{name}.parquet" for name in section.samples.poses}
+    random = samples / f"{RANDOM}.parquet"
+    inputs = {"rows": rows[starts.poses], "judged": samples / f"{VALIDATION}.parquet"}
     shared = {"n_hidden": starts.n_hidden, "seed": starts.seed, "success": starts.success}
     every = shared | {"spreads": starts.spreads, "n_starts": starts.n_starts}
     few = shared | {

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from flexik.cases.smartee.parts.poses import ACTUATED_FIELDS, ELBOW_FIELDS, SAMPLES, values
+from flexik.cases.smartee.parts.poses import ACTUATED_FIELDS, ELBOW_FIELDS, values
 from flexik.cases.smartee.section import SELECTION, Section
 from flexik.datasets.parts import Part, Work
 from flexik.datasets.tables import read_table
@@ -15,14 +15,15 @@ from flexik.parameters.trainers import Stopping
 
 def parts(section: Section) -> list[Part]:
     """A part a network."""
+    samples = section.data / "samples"
     return [
         Part(
             name,
             prepare,
             {"network": network, "trainer": section.trainers[network.trainer]},
             {
-                "rows": SAMPLES / f"{network.learns}.parquet",
-                "selection": SAMPLES / f"{SELECTION}.parquet",
+                "rows": samples / f"{network.learns}.parquet",
+                "selection": samples / f"{SELECTION}.parquet",
             },
         )
         for name, network in section.networks.items()
