@@ -23,12 +23,12 @@ from flexik import stage
 from flexik.cases.case import load
 from flexik.cases.crane.parts.conditions import at, at_points
 from flexik.cases.crane.parts.fields import TARGET_FIELDS
-from flexik.cases.crane.parts.methods import SAMPLES, method_of
+from flexik.cases.crane.parts.methods import method_of
 from flexik.cases.crane.report_results import query_key
 from flexik.datasets.tables import read_table
 from flexik.errors import DataError
 from flexik.evaluation.conditions import Conditions
-from flexik.kinematics.crane_manipulator import CraneManipulator, geometry_of
+from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.positioning.method import Method
 from flexik.reporting.tables import markdown, write_table
 
@@ -52,9 +52,9 @@ class Case:
 def cases() -> dict[str, Case]:
     """All methods by name; raises DataError naming what `make repro` has to make."""
     section = load("crane")
-    manipulator = CraneManipulator(geometry_of(section.machine))
+    manipulator = CraneManipulator(section.machine.geometry)
     try:
-        table = read_table(SAMPLES / "workspace.parquet", TARGET_FIELDS)
+        table = read_table(section.data / "samples/workspace.parquet", TARGET_FIELDS)
         methods = {name: method_of(section, name) for name in section.methods}
     except DataError as error:
         raise DataError(f"run `make repro` first: {error}") from error
