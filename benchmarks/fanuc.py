@@ -8,12 +8,14 @@ both. Needs `make repro` for data/fanuc. Writes reports/benchmarks/fanuc.csv and
 and .md beside each.
 """
 
+from machine import remark
+
+# isort: split
 import statistics
 import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -174,8 +176,6 @@ def main() -> None:
     chosen = sys.argv[1:] or ["times", "growth"]
     section = load("fanuc")
     arm = arm_of(section.machine.joints)
-    machine = f"One core, one BLAS thread; numpy {version('numpy')}, py-opw-kinematics "
-    machine += f"{version('py-opw-kinematics')}."
     with threadpool_limits(1):
         if "times" in chosen:
             table = measure(section, arm)
@@ -184,14 +184,14 @@ def main() -> None:
                 f"{N_BATCHED} poses, the time over their number. Least of {N_REPEATS} repeats.",
                 "closed_form: all eight arm configurations and limits, then the one asked for. "
                 "opw: py-opw-kinematics, all configurations, no limits; batched: one of each pose.",
-                machine,
+                remark(1, "numpy", "py-opw-kinematics"),
             ]
             decimals = {"microseconds_single": 1, "microseconds_batched": 2}
             write_table(OUTPUT / "fanuc", table, decimals, "Microseconds a pose.", remarks)
         if "growth" in chosen:
             table = grow(section, arm)
             caption = "Networks of the whole workspace, arm configuration 0; seconds of a core."
-            remarks = ["One start each.", machine]
+            remarks = ["One start each.", remark(1, "numpy")]
             write_table(OUTPUT / "fanuc_growth", table, 2, caption, remarks)
 
 

@@ -8,18 +8,15 @@ elbows) and reports/benchmarks/smartee_training.csv (seconds a run of the study 
 runs of many times its iterations come to), each with a Markdown file. On one core.
 """
 
-# ruff: noqa: E402
-import os
+from machine import remark
+
+# isort: split
 import statistics
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-
-from flexik import kernels
-
-kernels.fix()  # before NumPy is imported
 
 import pandas as pd
 
@@ -174,12 +171,8 @@ def main() -> None:
         raise FlexikError(f"usage: benchmarks/smartee.py [{' | '.join(PARTS)}], not {unknown[0]}")
     for name in chosen:
         function, file, remarks, decimals = PARTS[name]
-        before = os.getloadavg()[0]
         table = function()
-        load = (
-            f"Load of the machine {before:.1f} at the start, {os.getloadavg()[0]:.1f} at the end."
-        )
-        notes = [*remarks, load]
+        notes = [*remarks, remark(1, "numpy", "scipy")]
         write_table(OUTPUT / file, table, decimals, f"SmartEE: {name}.", notes)
         print(markdown(table, decimals, f"SmartEE: {name}.", notes))
 
