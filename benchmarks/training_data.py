@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from flexik.cases.case import load
 from flexik.cases.crane.parts.learning import lesson
 from flexik.cases.crane.parts.train import data_inputs
-from flexik.kinematics.crane_manipulator import geometry_of
 from flexik.learning.perceptron import Network, Normalisation, Quantity
 from flexik.learning.problem import Problem, problem
 from flexik.learning.training import Architecture, Lesson, train
@@ -37,7 +36,7 @@ def crane_lesson(network: str) -> Lesson:
 
     Raises DataError when the pipeline has not made them.
     """
-    geometry = geometry_of(load("crane").machine)
+    geometry = load("crane").machine.geometry
     architecture = Architecture(1, ACTIVATION)
     return lesson(NETWORKS[network], architecture, OURS(), SEED, geometry, **data_inputs())
 

@@ -17,7 +17,7 @@ os.environ["PYTHONPATH"] = str(Path(__file__).parents[1] / "src")
 import numpy as np  # noqa: E402
 from smoke_pipeline import ROOT, environment  # noqa: E402
 
-from flexik.kinematics.crane import CraneGeometry  # noqa: E402
+from flexik.machines.crane import CraneGeometry  # noqa: E402
 
 
 @pytest.fixture(scope="session")

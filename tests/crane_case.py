@@ -8,7 +8,7 @@ import pandas as pd
 
 from flexik.cases.case import load
 from flexik.cases.crane.parts.fields import SAMPLE_FIELDS
-from flexik.kinematics.crane_manipulator import CraneManipulator, geometry_of
+from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.multibody.crane.assembly import flexible_crane
 
 ROOT = Path(__file__).parents[1]
@@ -34,4 +34,4 @@ def samples(columns):
     return pd.DataFrame({f.name: column for f, column in zip(SAMPLE_FIELDS, columns, strict=True)})
 
 
-MANIPULATOR = CraneManipulator(geometry_of(section().machine))
+MANIPULATOR = CraneManipulator(section().machine.geometry)

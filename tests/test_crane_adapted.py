@@ -188,7 +188,7 @@ def test_play_of_a_pivot_shifts_it_against_the_force_that_carries(crane, joint):
                 "lift_pivot": tuple(geometry.lift_pivot + shift[k]),
                 "lift_cylinder_base": tuple(geometry.lift_cylinder_base - shift[k]),
             }
-        tip = forward(replace(geometry, **changed), strokes[None])
+        tip = forward(geometry.model_copy(update=changed), strokes[None])
         expected = (tip - forward(geometry, strokes[None]))[0] / gap
         assert found[k] == pytest.approx(expected, abs=1e-4)
 

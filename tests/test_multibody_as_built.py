@@ -188,18 +188,15 @@ def rigid_with_play(geometry, strokes, play, rods, pivots):
     angle = pose(geometry, strokes).lift_angle
     at_b = behind("lift_pivot")
     at_g = rotate(-angle, behind("jib_pivot")[None])[0]
-    moved = replace(
-        geometry,
-        lift_pivot=tuple(geometry.lift_pivot + at_b),
-        lift_cylinder_base=tuple(geometry.lift_cylinder_base - at_b),
-        jib_pivot=tuple(geometry.jib_pivot + at_g),
-        rocker_pivot=tuple(geometry.rocker_pivot - at_g),
-        lift_cylinder_length=geometry.lift_cylinder_length + slack("lift_cylinder"),
-        jib_cylinder_length=geometry.jib_cylinder_length + slack("jib_cylinder"),
-        rocker_length=geometry.rocker_length + slack("rocker"),
-        coupler_length=geometry.coupler_length + slack("coupler"),
-    )
-    return forward(moved, strokes)[0]
+    moved = {
+        "lift_pivot": geometry.lift_pivot + at_b,
+        "lift_cylinder_base": geometry.lift_cylinder_base - at_b,
+        "jib_pivot": geometry.jib_pivot + at_g,
+        "rocker_pivot": geometry.rocker_pivot - at_g,
+    }
+    moved = {name: tuple(point) for name, point in moved.items()}
+    moved |= {f"{rod}_length": getattr(geometry, f"{rod}_length") + slack(rod) for rod in RODS}
+    return forward(geometry.model_copy(update=moved), strokes)[0]
 
 
 @pytest.mark.parametrize("element", ["geometrically_exact", "ancf"])

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import fsolve
 
-from flexik.kinematics.crane import CraneGeometry, pose
+from flexik.kinematics.crane import pose
+from flexik.machines.crane import CraneGeometry
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float]
@@ -126,7 +127,8 @@ def nominal_structure(spring_stiffness: float) -> Structure:
     lift_points = ((-0.09, 1.115), (0.26, -1.04), (0.3025, -0.105), (2.88, -0.024))
     jib_points = ((-0.19, -0.015), (-1.4165, 0.203), (-0.095, 0.24), (2.141, 0.008))
     lengths = (0.8, 1.037, 0.45, 0.48)
-    geometry = CraneGeometry(*lift_points, *jib_points, *lengths, (0.535, 0.78, 1.6))
+    values = *lift_points, *jib_points, *lengths, (0.535, 0.78, 1.6)
+    geometry = CraneGeometry(**dict(zip(CraneGeometry.model_fields, values, strict=True)))
     # the pillar's body frame is the ground frame turned a quarter: abscissa y, lateral -x
     pillar_pins = {"ground": (-0.311, 0.0), "C": (0.075, -0.17), "B": (1.115, 0.09)}
     lift_pins = {"B": (0.0, 0.0), "D": (0.3025, -0.105), "E": (1.2735, 0.164)}

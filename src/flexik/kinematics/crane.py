@@ -8,7 +8,6 @@ flexible model puts its pins at the same points. The tips differ from the code's
 (0.2 mm for jib strokes up to 0.58 m).
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,59 +15,13 @@ from numpy.typing import NDArray
 
 from flexik.errors import ParameterError
 from flexik.kinematics.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
+from flexik.machines.crane import CraneGeometry
+from flexik.parameters.model import Vector
 
 Array = NDArray[np.float64]
-Vector = tuple[float, float]
 
 # A stroke this far outside its limits is round-off of a target on the border, m
 STROKE_TOLERANCE = 1e-10
-
-
-@dataclass(frozen=True)
-class CraneGeometry:
-    """Dimensions in m. Frames: `ground`; `lift` (origin B, x along the arm); `jib` (origin G).
-
-    lift_pivot : B in the ground frame.
-    lift_cylinder_base : C from B, in the ground frame (C sits on the pillar).
-    lift_cylinder_head : D in the lift frame.
-    jib_pivot : G in the lift frame.
-    rocker_pivot : F from G, in the lift frame.
-    jib_cylinder_base : E from F, in the lift frame.
-    coupler_pin : I in the jib frame.
-    extension_start : J from I, in the jib frame; the tip lies `stroke` farther along x.
-    lift_cylinder_length, jib_cylinder_length : |CD| and |EH| at zero stroke.
-    rocker_length, coupler_length : |FH| and |HI|.
-    stroke_maximum : longest strokes of lift, jib and extension cylinder; the shortest are zero.
-    """
-
-    lift_pivot: Vector
-    lift_cylinder_base: Vector
-    lift_cylinder_head: Vector
-    jib_pivot: Vector
-    rocker_pivot: Vector
-    jib_cylinder_base: Vector
-    coupler_pin: Vector
-    extension_start: Vector
-    lift_cylinder_length: float
-    jib_cylinder_length: float
-    rocker_length: float
-    coupler_length: float
-    stroke_maximum: tuple[float, float, float]
-
-    @property
-    def rocker_pivot_in_lift(self) -> Vector:
-        """F in the lift frame."""
-        return _add(self.jib_pivot, self.rocker_pivot)
-
-    @property
-    def jib_cylinder_base_in_lift(self) -> Vector:
-        """E in the lift frame."""
-        return _add(self.rocker_pivot_in_lift, self.jib_cylinder_base)
-
-    @property
-    def extension_start_in_jib(self) -> Vector:
-        """J in the jib frame."""
-        return _add(self.coupler_pin, self.extension_start)
 
 
 class CranePose(NamedTuple):
@@ -132,11 +85,11 @@ def pose(geometry: CraneGeometry, strokes: Array) -> CranePose:
         lift_pivot=pivot,
         lift_cylinder_head=from_lift(geometry.lift_cylinder_head),
         jib_pivot=jib_pivot,
-        rocker_pivot=from_lift(geometry.rocker_pivot_in_lift),
-        jib_cylinder_base=from_lift(geometry.jib_cylinder_base_in_lift),
+        rocker_pivot=from_lift(rocker_pivot_in_lift(geometry)),
+        jib_cylinder_base=from_lift(jib_cylinder_base_in_lift(geometry)),
         rocker_head=from_lift(rocker_head),
         coupler_pin=from_jib(geometry.coupler_pin),
-        extension_start=from_jib(geometry.extension_start_in_jib),
+        extension_start=from_jib(extension_start_in_jib(geometry)),
         tip=from_jib(_tip_in_jib(geometry, strokes[:, 2])),
         lift_angle=lift_angle,
         jib_angle=jib_angle,
@@ -222,6 +175,21 @@ def rotate(angle: Array, vectors: Array) -> Array:
     return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
 
+def rocker_pivot_in_lift(geometry: CraneGeometry) -> Vector:
+    """F in the lift frame, m."""
+    return _add(geometry.jib_pivot, geometry.rocker_pivot)
+
+
+def jib_cylinder_base_in_lift(geometry: CraneGeometry) -> Vector:
+    """E in the lift frame, m."""
+    return _add(rocker_pivot_in_lift(geometry), geometry.jib_cylinder_base)
+
+
+def extension_start_in_jib(geometry: CraneGeometry) -> Vector:
+    """J in the jib frame, m."""
+    return _add(geometry.coupler_pin, geometry.extension_start)
+
+
 def _add(a: Vector, b: Vector) -> Vector:
     return (a[0] + b[0], a[1] + b[1])
 
@@ -247,7 +215,7 @@ def _opposite_angle(a: float | Array, b: float | Array, c: float | Array) -> Arr
 
 
 def _tip_in_jib(geometry: CraneGeometry, extension: Array) -> Array:
-    start = geometry.extension_start_in_jib
+    start = extension_start_in_jib(geometry)
     return np.stack([start[0] + extension, np.full_like(extension, start[1])], axis=-1)
 
 
@@ -270,7 +238,7 @@ def _lift_stroke(geometry: CraneGeometry, lift_angle: Array) -> Array:
 def _jib_angle(geometry: CraneGeometry, stroke: Array) -> tuple[Array, Array]:
     """Jib angle relative to the lift arm (n,), and H in the lift frame (n, 2)."""
     pivot = np.array(geometry.jib_pivot)
-    rocker_pivot = np.array(geometry.rocker_pivot_in_lift)
+    rocker_pivot = np.array(rocker_pivot_in_lift(geometry))
     base = geometry.jib_cylinder_base
     length = geometry.jib_cylinder_length + stroke
     # H lies above the arm: clockwise from the direction F -> E
@@ -287,7 +255,7 @@ def _jib_angle(geometry: CraneGeometry, stroke: Array) -> tuple[Array, Array]:
 
 def _jib_stroke(geometry: CraneGeometry, relative_angle: Array) -> Array:
     pivot = np.array(geometry.jib_pivot)
-    rocker_pivot = np.array(geometry.rocker_pivot_in_lift)
+    rocker_pivot = np.array(rocker_pivot_in_lift(geometry))
     radius = float(np.hypot(*geometry.coupler_pin))
     pin = pivot + radius * _unit(relative_angle + _arg(geometry.coupler_pin))
     to_pin = pin - rocker_pivot
@@ -338,7 +306,7 @@ def _inverse_branch(
 
 def _extension_borders(geometry: CraneGeometry, targets: Array) -> list[Array]:
     """Extensions (n,) at which a target meets a limit of lift or jib, or the fold; may be NaN."""
-    start = geometry.extension_start_in_jib
+    start = extension_start_in_jib(geometry)
     from_pivot = targets - np.array(geometry.lift_pivot)
     reach = np.hypot(from_pivot[:, 0], from_pivot[:, 1])
     arm = float(np.hypot(*geometry.jib_pivot))

@@ -9,11 +9,22 @@ from flexik.parameters.model import Count, Interval, Model, NotNegative, Positiv
 # Lengths closer than this are the same, m
 LENGTH_TOLERANCE = 1e-9
 
-Strokes = tuple[Positive, Positive, Positive]
 
+class CraneGeometry(Model):
+    """Dimensions in m. Frames: `ground`; `lift` (origin B, x along the arm); `jib` (origin G).
 
-class Geometry(Model):
-    """Rigid kinematics, see kinematics.crane.CraneGeometry; m."""
+    lift_pivot : B in the ground frame.
+    lift_cylinder_base : C from B, in the ground frame (C sits on the pillar).
+    lift_cylinder_head : D in the lift frame.
+    jib_pivot : G in the lift frame.
+    rocker_pivot : F from G, in the lift frame.
+    jib_cylinder_base : E from F, in the lift frame.
+    coupler_pin : I in the jib frame.
+    extension_start : J from I, in the jib frame; the tip lies `stroke` farther along x.
+    lift_cylinder_length, jib_cylinder_length : |CD| and |EH| at zero stroke.
+    rocker_length, coupler_length : |FH| and |HI|.
+    stroke_maximum : longest strokes of lift, jib and extension cylinder; the shortest are zero.
+    """
 
     lift_pivot: Vector
     lift_cylinder_base: Vector
@@ -27,7 +38,7 @@ class Geometry(Model):
     jib_cylinder_length: Positive
     rocker_length: Positive
     coupler_length: Positive
-    stroke_maximum: Strokes
+    stroke_maximum: tuple[Positive, Positive, Positive]
 
 
 class Beam(Model):
@@ -65,7 +76,7 @@ class Beams(Model):
 
 
 class Rod(Model):
-    """A rigid two-pin link."""
+    """A rigid two-pin link: mass in kg and distance of its centre from its first pin in m."""
 
     mass: Positive
     centre_of_mass: NotNegative
@@ -87,7 +98,7 @@ class Structure(Model):
 class Machine(Model):
     """The whole machine."""
 
-    geometry: Geometry
+    geometry: CraneGeometry
     structure: Structure
 
     @model_validator(mode="after")

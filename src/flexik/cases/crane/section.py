@@ -10,7 +10,6 @@ from flexik.cases.crane.measured_section import Measured
 from flexik.cases.crane.parts.measured.campaign_file import own_campaign
 from flexik.errors import DataError, ParameterError
 from flexik.kinematics.crane import check_assembly, smallest_extension
-from flexik.kinematics.crane_manipulator import geometry_of
 from flexik.machines.crane import LENGTH_TOLERANCE, Machine
 from flexik.multibody.beams import read_section
 from flexik.parameters.conditions import ConditionSet, Points, RandomTargets, check_different
@@ -223,7 +222,7 @@ def check(section: Section) -> None:
 
     Raises ParameterError naming the key.
     """
-    machine, geometry = section.machine, geometry_of(section.machine)
+    machine, geometry = section.machine, section.machine.geometry
     for name, path in machine.structure.beams.sections.items():
         try:
             read_section(path)

@@ -10,8 +10,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from flexik.errors import ParameterError, SolverError
-from flexik.kinematics.crane import CraneGeometry, check_assembly
+from flexik.kinematics.crane import check_assembly
 from flexik.kinematics.crane_dimensions import LENGTHS, VECTORS, corrected
+from flexik.machines.crane import CraneGeometry
 from flexik.multibody.beams import Array
 from flexik.multibody.crane.model import PIVOTS, RODS, CraneModel, listed, solve
 from flexik.multibody.crane.statics import joint_forces

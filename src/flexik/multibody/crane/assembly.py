@@ -5,10 +5,9 @@ from pathlib import Path
 
 from flexik.errors import DataError
 from flexik.files import read_json
-from flexik.kinematics.crane_manipulator import geometry_of
 from flexik.machines.crane import Machine, Structure
 from flexik.multibody.beams import Beam, read_section
-from flexik.multibody.crane.structure import CraneStructure, FlexibleCrane, Rod
+from flexik.multibody.crane.structure import CraneStructure, FlexibleCrane
 
 
 def flexible_crane(machine: Machine, spring_stiffness: float) -> FlexibleCrane:
@@ -19,13 +18,13 @@ def flexible_crane(machine: Machine, spring_stiffness: float) -> FlexibleCrane:
     given = machine.structure
     structure = CraneStructure(
         **{name: _beam(given, name) for name in given.beams.sections},
-        rocker=Rod(given.rocker.mass, given.rocker.centre_of_mass),
-        coupler=Rod(given.coupler.mass, given.coupler.centre_of_mass),
+        rocker=given.rocker,
+        coupler=given.coupler,
         lift_axis_height=given.lift_axis_height,
         jib_axis_height=given.jib_axis_height,
         gravity=given.gravity,
     )
-    return FlexibleCrane(geometry_of(machine), structure, spring_stiffness, given.element)
+    return FlexibleCrane(machine.geometry, structure, spring_stiffness, given.element)
 
 
 def read_spring_stiffness(path: Path | str) -> float:

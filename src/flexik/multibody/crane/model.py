@@ -12,10 +12,18 @@ import numpy as np
 from exudyn import itemInterface as item
 
 from flexik.errors import SolverError
-from flexik.kinematics.crane import CranePose, Vector, pose
+from flexik.kinematics.crane import (
+    CranePose,
+    extension_start_in_jib,
+    jib_cylinder_base_in_lift,
+    pose,
+    rocker_pivot_in_lift,
+)
+from flexik.machines.crane import Rod
 from flexik.multibody.beams import Array, Elements
-from flexik.multibody.crane.structure import SLIDING, FlexibleCrane, Meshes, Rod, beam_meshes
+from flexik.multibody.crane.structure import SLIDING, FlexibleCrane, Meshes, beam_meshes
 from flexik.multibody.elements import place_beam
+from flexik.parameters.model import Vector
 
 # Newton's residual, N and N m: it falls quadratically onto a round-off floor of about 1e-4 (stiff
 # axial terms); one step after passing this tolerance the solution is on the floor
@@ -281,7 +289,7 @@ class CraneModel:
         """Join the beams by pins, pads and rods; returns the connectors whose force is reported."""
         geometry, structure = self.crane.geometry, self.crane.structure
         extension = self.beams["extension"]
-        height = geometry.extension_start_in_jib[1]
+        height = extension_start_in_jib(geometry)[1]
         rear_pad = self.crane.rear_pad(self.extension)
         self._rear_pad = self._on_jib((rear_pad, height))
         self._front_pad = extension.marker(structure.front_pad - rear_pad)
@@ -296,13 +304,13 @@ class CraneModel:
             constrainRotation=False,
         )
         head = self.system.AddMarker(item.MarkerNodePosition(nodeNumber=self._head))
-        rocker_pin = self._on_lift(geometry.rocker_pivot_in_lift)
+        rocker_pin = self._on_lift(rocker_pivot_in_lift(geometry))
         coupler_pin = self._on_jib(geometry.coupler_pin)
         self._hang_rod(structure.rocker, geometry.rocker_length, rocker_pin, head)
         self._hang_rod(structure.coupler, geometry.coupler_length, head, coupler_pin)
         lift_base = self._on_pillar(geometry.lift_cylinder_base)
         lift_head = self._on_lift(geometry.lift_cylinder_head)
-        jib_base = self._on_lift(geometry.jib_cylinder_base_in_lift)
+        jib_base = self._on_lift(jib_cylinder_base_in_lift(geometry))
         return {
             "lift_cylinder": self._rod(lift_base, lift_head, geometry.lift_cylinder_length),
             "jib_cylinder": self._rod(jib_base, head, geometry.jib_cylinder_length),

@@ -3,20 +3,17 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from flexik.kinematics.crane import CraneGeometry
+from flexik.kinematics.crane import (
+    extension_start_in_jib,
+    jib_cylinder_base_in_lift,
+    rocker_pivot_in_lift,
+)
+from flexik.machines.crane import CraneGeometry, Rod
 from flexik.multibody.beams import Beam, Elements, discretise
 
 BEAMS = ("pillar", "lift", "jib", "extension")
 # Beams whose mesh depends on the extension stroke: the pads slide on them
 SLIDING = ("jib", "extension")
-
-
-@dataclass(frozen=True)
-class Rod:
-    """A rigid two-pin link: mass in kg and distance of its centre from its first pin in m."""
-
-    mass: float
-    centre_of_mass: float
 
 
 @dataclass(frozen=True)
@@ -66,7 +63,7 @@ class FlexibleCrane:
 
     def rear_pad(self, extension: float) -> float:
         """Abscissa of the rear pad at stroke `extension`, jib frame, m."""
-        start = self.geometry.extension_start_in_jib[0]
+        start = extension_start_in_jib(self.geometry)[0]
         return start + extension - self.structure.extension_length
 
 
@@ -80,8 +77,8 @@ def beam_meshes(crane: FlexibleCrane, extension: float, names: Sequence[str] = B
         "pillar": (geometry.lift_pivot[1] + geometry.lift_cylinder_base[1],),
         "lift": (
             geometry.lift_cylinder_head[0],
-            geometry.jib_cylinder_base_in_lift[0],
-            geometry.rocker_pivot_in_lift[0],
+            jib_cylinder_base_in_lift(geometry)[0],
+            rocker_pivot_in_lift(geometry)[0],
         ),
         "jib": (geometry.coupler_pin[0], 0.0, rear_pad),
         "extension": (crane.structure.front_pad - rear_pad,),

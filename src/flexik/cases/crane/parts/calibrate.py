@@ -16,7 +16,7 @@ from flexik.datasets.tables import read_csv
 from flexik.errors import DataError
 from flexik.evaluation.calibration import fit_spring
 from flexik.evaluation.errors import evaluate, statistics, tip_judge
-from flexik.kinematics.crane_manipulator import CraneManipulator, geometry_of
+from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.machines.crane import Machine
 from flexik.multibody.crane.assembly import flexible_crane
 from flexik.multibody.crane.model import tips
@@ -46,7 +46,7 @@ def _spring(machine: Machine, calibration: Calibration, published: Path) -> dict
     table = read_csv(published, ("none",), ("statistic",)).set_index("statistic")["none"]
     if "mean_error" not in table:
         raise DataError(f"{published}: expected a row mean_error")
-    manipulator, columns = CraneManipulator(geometry_of(machine)), columns_of(machine)
+    manipulator, columns = CraneManipulator(machine.geometry), columns_of(machine)
     conditions = at_points(calibration.conditions, manipulator)
     method = Uncompensated(manipulator)
 

@@ -8,7 +8,7 @@ from flexik.cases.crane.parts.crane import DATA
 from flexik.cases.crane.section import Section
 from flexik.datasets.tables import read_table
 from flexik.errors import ParameterError
-from flexik.kinematics.crane_manipulator import CraneManipulator, geometry_of
+from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.manipulator import Manipulator
 from flexik.learning.storage import load_network
 from flexik.positioning.method import Ingredients, Method, Network, Settings
@@ -54,6 +54,6 @@ def method_of(section: Section, name: str) -> Method:
     if name not in section.methods:
         known = ", ".join(section.methods)
         raise ParameterError(f"crane.methods: there is no {name!r} ({known})")
-    manipulator = CraneManipulator(geometry_of(section.machine))
+    manipulator = CraneManipulator(section.machine.geometry)
     inputs = method_inputs(section, name)
     return trained_method(**method_settings(section, name), manipulator=manipulator, **inputs)

@@ -16,9 +16,8 @@ from flexik.cases.crane.parts.fields import FAILED, INPUTS, KEPT, LEFT_OUT, SAMP
 from flexik.cases.crane.section import Grid, Section, Selection
 from flexik.datasets.parts import Part, Work, Writer, stacked, table
 from flexik.errors import ParameterError, SolverError
-from flexik.kinematics.crane import CraneGeometry, forward
-from flexik.kinematics.crane_manipulator import geometry_of
-from flexik.machines.crane import Machine
+from flexik.kinematics.crane import forward
+from flexik.machines.crane import CraneGeometry, Machine
 from flexik.multibody.crane.model import solve
 from flexik.multibody.crane.structure import FlexibleCrane
 
@@ -73,7 +72,7 @@ def prepare_selection(
 ) -> Work:
     """The random set."""
     given = selection.n_samples, selection.payload, minimum_tip_x, selection.seed
-    drawn = random_samples(geometry_of(machine), *given)
+    drawn = random_samples(machine.geometry, *given)
     function = functools.partial(solve_samples, flexible(machine, spring), minimum_tip_x)
     finish = functools.partial(_finish, "selection", maximum_failed_share)
     return Work(function, split(drawn), finish)

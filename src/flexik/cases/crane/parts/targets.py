@@ -15,7 +15,7 @@ from flexik.errors import ParameterError
 from flexik.evaluation.conditions import Array
 from flexik.evaluation.targets import draw_candidates, reachable_targets
 from flexik.kinematics.crane import smallest_extension
-from flexik.kinematics.crane_manipulator import CraneManipulator, geometry_of
+from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.machines.crane import Machine
 from flexik.multibody.crane.model import solve
 from flexik.multibody.crane.structure import FlexibleCrane
@@ -52,7 +52,7 @@ def prepare(
     n, generator = MAXIMUM_CANDIDATES * random.n_targets, np.random.default_rng(random.seed)
     drawn = np.column_stack(draw_candidates(n, lower, upper, random.payload, generator))
     drawn = drawn[drawn[:, 0] >= minimum_x]
-    drawn = drawn[~np.isnan(smallest_extension(geometry_of(machine), drawn[:, :2]))]
+    drawn = drawn[~np.isnan(smallest_extension(machine.geometry, drawn[:, :2]))]
     first = round(TRIED * random.n_targets)
     tried, others = drawn[:first], drawn[first:]
     reach = functools.partial(_reach, flexible(machine, spring), random)

@@ -8,14 +8,13 @@ from typing import Any
 from flexik.cases.crane.parts.learning import KINDS, lesson
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part, Work
-from flexik.kinematics.crane import CraneGeometry
-from flexik.kinematics.crane_manipulator import geometry_of
 from flexik.learning.fit import fit
 from flexik.learning.modular import combine
 from flexik.learning.perceptron import Network, quantities
 from flexik.learning.size_selection import read_layers
 from flexik.learning.storage import load_network
 from flexik.learning.training import Architecture
+from flexik.machines.crane import CraneGeometry
 from flexik.parameters.trainers import Stopping
 
 NETWORKS, SAMPLES, SIZES = (Path("data/crane") / name for name in ("networks", "samples", "sizes"))
@@ -47,7 +46,7 @@ def described(section: Section, name: str) -> dict[str, Any]:
     """Settings of what network `name` learns."""
     network = section.networks[name]
     return {
-        "geometry": geometry_of(section.machine),
+        "geometry": section.machine.geometry,
         "kind": network.learns or "correction",
         "seed": network.seed,
     }

@@ -16,10 +16,10 @@ from flexik.cases.crane.parts.measured.twins import Generator, measured_tips, tw
 from flexik.datasets.parts import Columns, Work, rows, stacked
 from flexik.errors import ParameterError
 from flexik.evaluation.targets import draw_candidates
-from flexik.kinematics.crane import CraneGeometry, smallest_extension
+from flexik.kinematics.crane import smallest_extension
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.status import REACHED
-from flexik.machines.crane import Machine
+from flexik.machines.crane import CraneGeometry, Machine
 from flexik.multibody.crane.as_built import Magnitudes
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning import combined

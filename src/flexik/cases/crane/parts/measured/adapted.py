@@ -11,9 +11,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from flexik.cases.crane.measured_section import Expected
-from flexik.kinematics.crane import CraneGeometry, forward
+from flexik.kinematics.crane import forward
 from flexik.kinematics.crane_dimensions import DIMENSIONS, LENGTHS, corrected
 from flexik.kinematics.crane_manipulator import CraneManipulator
+from flexik.machines.crane import CraneGeometry
 from flexik.multibody.crane.statics import JOINTS, compliance
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning.combined import Combined

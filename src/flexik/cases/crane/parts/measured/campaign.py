@@ -16,7 +16,6 @@ from flexik.cases.crane.parts.measured.fields import CAMPAIGN
 from flexik.cases.crane.parts.measured.nominal import approaches, read_network
 from flexik.cases.crane.parts.measured.twins import measured_tips, twin_and_generator
 from flexik.datasets.parts import Work, Writer, table, whole
-from flexik.kinematics.crane_manipulator import geometry_of
 from flexik.machines.crane import Machine
 from flexik.multibody.crane.as_built import Magnitudes
 from flexik.multibody.crane.structure import FlexibleCrane
@@ -26,7 +25,7 @@ from flexik.positioning.method import Array
 
 def prepare_own(*, machine: Machine, file: Path) -> Work:
     """The campaign of `file`."""
-    found = own_campaign(file, geometry_of(machine))
+    found = own_campaign(file, machine.geometry)
     columns = {field.name: found[field.name].to_numpy() for field in CAMPAIGN}
     return whole(written, columns=columns)
 
