@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from flexik.datasets.parallel import ParallelSettings, from_environment, parallel_map
 from flexik.errors import DataError
 from flexik.files import file_checksum, read_json, write_json, write_text
+from flexik.parameters.section import CaseSection
 from flexik.reporting import style
 from flexik.reporting.page import render
 from flexik.reporting.tables import Table
@@ -71,6 +72,15 @@ def made_from(section: Any, files: Iterable[Path | str]) -> dict[str, str]:
     keys = section.model_dump(mode="json")
     found = {f"params.yaml: {key}": digest(value) for key, value in keys.items()}
     return found | {Path(path).as_posix(): file_checksum(path) for path in files}
+
+
+def write_case(
+    section: CaseSection, template: Path, content: Content, files: Iterable[Path | str]
+) -> None:
+    """Write the report of a case; it is made from its section, its machine and `files` too."""
+    sources = made_from(section, [section.machine_file, *files])
+    record = section.data / "report.json"
+    write_report(section.report, template, content, sources=sources, record=record)
 
 
 def write_report(

@@ -1,14 +1,14 @@
 """Figures of the crane's report, after those of Rouvinen 1999; lengths in m until drawn."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
-from flexik.cases.crane.parts.fields import STROKES, deflection
+from flexik.cases.crane.parts.fields import STROKES, deflection, on_line
 from flexik.cases.crane.report_mechanism import LINK_LOOKS, crane, links
 from flexik.cases.crane.report_results import Results
-from flexik.evaluation.errors import comparison
+from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.status import REACHED
 from flexik.reporting import kinds, plane, style
 from flexik.reporting.chart import Axis, Layer, chart
@@ -25,8 +25,11 @@ VARIANTS = ("_selected", "_ga", "_gauss_newton")
 def figures(results: Results) -> dict[str, Drawing]:
     """All figures by name."""
     return {
-        "crane": crane(results.geometry, results.shape),
-        **_training_data(results),
+        "crane": crane(results.section.machine.geometry, results.shape),
+        "training_points": _training_points(results),
+        "test_points": _test_points(results),
+        "initial_positions": _initial_positions(results),
+        **_sequences(results),
         **_errors(results),
         **_sizes(results),
         "training_race": _race(results.training_curves),
@@ -34,30 +37,39 @@ def figures(results: Results) -> dict[str, Drawing]:
     }
 
 
-def _looks(results: Results) -> dict:
-    return style.looks(("none", *results.methods), VARIANTS)
-
-
-def _training_data(results: Results) -> dict[str, Drawing]:
-    kept = results.kept
-    found = {
-        "training_points": _training_points(results),
-        "test_points": _test_points(results),
-        "initial_positions": _initial_positions(results),
-        "sequences": _sequences(kept),
-        "normalised_deflection": _pair(deflection(kept), "deflection", "mm", MM),
+def _sequences(results: Results) -> dict[str, Drawing]:
+    """What networks take and learn, in the order of the samples."""
+    kept, difference = results.kept, "flexible tip minus trained rigid network"
+    inputs = {name.replace("_", " "): kept[name].to_numpy() for name in (*STROKES, "payload")}
+    colours = [LINK_LOOKS[name]["color"] for name in ("lift arm", "jib", "extension")]
+    found = {"sequences": _sequence(inputs, ("mm", "mm", "mm", "kg"), [*colours, style.PURPLE])}
+    learnt = {
+        "deflection": ("deflection", "mm", deflection(kept)),
+        "rigid": ("rigid tip", "m", kept[["rigid_x", "rigid_y"]].to_numpy()),
+        "tip": ("flexible tip", "m", kept[["tip_x", "tip_y"]].to_numpy()),
+        **{f"difference_{k}": (difference, "mm", v) for k, v in results.corrections.items()},
     }
-    for name, what in (("rigid", "rigid tip"), ("tip", "flexible tip")):
-        values = kept[[f"{name}_x", f"{name}_y"]].to_numpy()
-        found[f"normalised_{name}"] = _pair(values, what, "m", 1.0)
-    for name, values in results.corrections.items():
-        what = "flexible tip minus trained rigid network"
-        found[f"normalised_difference_{name}"] = _pair(values, what, "mm", MM)
+    for name, (what, unit, values) in learnt.items():
+        parts = {f"{what} in {axis}": column for axis, column in zip("xy", values.T, strict=True)}
+        drawn = _sequence(parts, (unit, unit), (style.BLUE, style.VERMILION))
+        found[f"normalised_{name}"] = drawn
     return found
+
+
+def _sequence(
+    parts: Mapping[str, np.ndarray], units: Sequence[str], colours: Sequence[str]
+) -> Drawing:
+    titled = {}
+    for (name, values), unit in zip(parts.items(), units, strict=True):
+        ends, digits = np.array([values.min(), values.max()]), 2 if unit == "m" else 1
+        low, high = ((MM if unit == "mm" else 1.0) * ends).round(digits)
+        titled[f"{name}: {style.signed(low)} to {style.signed(high)} {unit}"] = values
+    return draw(kinds.sequences, titled, colours)
 
 
 def _training_points(results: Results) -> Drawing:
     """All training points, and enlarged those about the largest deflection."""
+    geometry = results.section.machine.geometry
     kept = results.kept.sort_values("payload", ascending=False, kind="stable")
     far = int(np.hypot(*deflection(kept).T).argmax())
     tip = kept[["tip_x", "tip_y"]].to_numpy()[far]
@@ -66,7 +78,7 @@ def _training_points(results: Results) -> Drawing:
     frame = pd.DataFrame(corners, columns=["x", "y"]).assign(panel="all")
     rigid = kept.drop_duplicates(["rigid_x", "rigid_y"])
     plus = {"color": style.INK, "markersize": 5, "markeredgewidth": 0.7, "zorder": 2.6}
-    parts = links(results.geometry, np.array(results.geometry.stroke_maximum)[None] / 2)
+    parts = links(geometry, np.array(geometry.stroke_maximum)[None] / 2)
     ink, tips = {"color": style.INK, "linewidth": 0.9}, ("tip_x", "tip_y")
     dots, small = {"markersize": 5, "markeredgewidth": 0}, {"markersize": 3}
     return draw(
@@ -113,7 +125,9 @@ def _test_points(results: Results) -> Drawing:
 
 def _initial_positions(results: Results) -> Drawing:
     names = [style.coordinates(*point) for point in results.points]
-    parts = links(results.geometry, results.initial)
+    manipulator = CraneManipulator(results.section.machine.geometry)
+    initial = manipulator.initial_positions(np.array(results.points))
+    parts = links(manipulator.geometry, initial)
     parts["point"] = [names[k] for k in parts["crane"]]
     points = pd.DataFrame(results.points, columns=["x", "y"]).assign(point=names)
     dot = {"color": style.INK, "fillstyle": "none", "markersize": 5}
@@ -131,28 +145,9 @@ def _initial_positions(results: Results) -> Drawing:
     )
 
 
-def _sequences(kept: pd.DataFrame) -> Drawing:
-    units = dict.fromkeys(STROKES, ("mm", MM)) | {"payload": ("kg", 1.0)}
-    parts = {}
-    for name, (unit, scale) in units.items():
-        low, high = (style.signed(scale * v) for v in (kept[name].min(), kept[name].max()))
-        parts[f"{name.replace('_', ' ')}: {low} to {high} {unit}"] = kept[name].to_numpy()
-    colours = [LINK_LOOKS[name]["color"] for name in ("lift arm", "jib", "extension")]
-    return draw(kinds.sequences, parts, [*colours, style.PURPLE])
-
-
-def _pair(values: np.ndarray, what: str, unit: str, scale: float) -> Drawing:
-    """Sequences of the two columns of `values` (n, 2) in m."""
-    digits, parts = 1 if unit == "mm" else 2, {}
-    for axis, column in zip("xy", values.T, strict=True):
-        ends = scale * column.min(), scale * column.max()
-        low, high = (style.signed(round(float(end), digits)) for end in ends)
-        parts[f"{what} in {axis}: {low} to {high} {unit}"] = column
-    return draw(kinds.sequences, parts, (style.BLUE, style.VERMILION))
-
-
 def _errors(results: Results) -> dict[str, Drawing]:
-    looks, variants = _looks(results), results.groups["variants"]
+    looks = style.looks(("none", *results.methods), VARIANTS)
+    variants = results.groups["variants"]
     shown = {k: f for k, f in results.workspace.items() if len(f) and k not in variants}
     over_workspace = pd.concat(shown, names=["method"]).reset_index(level="method")
     found = {
@@ -182,25 +177,26 @@ def _errors(results: Results) -> dict[str, Drawing]:
 
 
 def _comparison(results: Results) -> Drawing:
-    compared = comparison(
-        results.statistics, results.published["positioning_errors"], results.published_columns
-    )
+    labels = list(results.statistics)
+    compared = results.compared(labels).T
+    whats, theirs = ("mean", "max"), [f"{label} published" for label in labels]
     rows = [
-        {
-            "method": label,
-            "what": what,
-            "ours": compared.loc[f"{what}_error", label],
-            "published": compared.loc[f"{what}_error", f"{label} published"],
-        }
-        for what in ("mean", "max")
-        for label in results.statistics
+        pd.DataFrame(
+            {
+                "method": labels,
+                "what": what,
+                "ours": compared.loc[labels, f"{what}_error"].to_numpy(),
+                "published": compared.loc[theirs, f"{what}_error"].to_numpy(),
+            }
+        )
+        for what in whats
     ]
-    axes = {what: Axis(f"{what} R (mm)", log=True) for what in ("mean", "max")}
     return draw(
         kinds.beside,
-        *(pd.DataFrame(rows), "method", "ours", "published", axes),
+        *(pd.concat(rows, ignore_index=True), "method", "ours", "published"),
+        {what: Axis(f"{what} R (mm)", log=True) for what in whats},
         panel="what",
-        titles=dict.fromkeys(axes, ""),
+        titles=dict.fromkeys(whats, ""),
         columns=2,
     )
 
@@ -301,7 +297,7 @@ def _sizes(results: Results) -> dict[str, Drawing]:
             chosen=size,
             published=published[name],
             titles=f"Choice: smallest size within {tolerance:g} % of the least selection error"
-            if (tolerance := 100 * results.networks[name].select.tolerance)
+            if (tolerance := 100 * results.section.networks[name].select.tolerance)
             else "Choice: size of the least selection error",
         )
     if found:
@@ -337,7 +333,9 @@ def _race(curves: pd.DataFrame) -> Drawing:
 def _fitting(results: Results) -> Drawing:
     """Networks of several sizes along a slice (figures 2.9 and 2.10)."""
     curves = results.fitting
-    samples = results.slice_samples.assign(y=lambda rows: rows["tip_y"] - rows["rigid_y"])
+    line = results.section.studies.fitting
+    samples = results.kept[on_line(results.kept, line.jib, line.extension, line.payload)]
+    samples = samples.assign(y=samples["tip_y"] - samples["rigid_y"])
     sizes = sorted(curves["n_hidden"].unique())
     titles = {n: f"{n} hidden neurons" for n in sizes}
     if len(sizes) > 1:

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from flexik.cases.crane.parts.fields import kept, on_line
-from flexik.cases.crane.parts.learning import correction, learnt_rows
+from flexik.cases.crane.parts.fields import kept
+from flexik.cases.crane.parts.learning import correction
 from flexik.cases.crane.section import Section
 from flexik.datasets.tables import read_csv, read_table
-from flexik.evaluation.errors import statistics
+from flexik.evaluation.errors import STATISTICS, statistics, workspace_statistics
 from flexik.evaluation.operations import (
     forward_operations,
     gauss_newton_step_operations,
@@ -22,8 +21,6 @@ from flexik.evaluation.operations import (
     normalisation_operations,
 )
 from flexik.files import read_json
-from flexik.kinematics.crane import CraneGeometry
-from flexik.kinematics.crane_manipulator import CraneManipulator, geometry_of
 from flexik.learning.perceptron import Network
 from flexik.learning.size_selection import by_size, read_layers
 from flexik.learning.storage import load_network
@@ -32,18 +29,21 @@ from flexik.positioning.method import Settings
 from flexik.reporting.report import digest
 from flexik.reporting.style import MM
 
-Array = NDArray[np.float64]
-
 BENCHMARKS, REFERENCE = Path("reports/benchmarks"), Path("data/reference/crane")
-# What networks learn, as the thesis' methods call it; those that correct others are `correction`
+# What networks learn, as the thesis' methods call it
 KIND = {
     "deflection": "deflection",
     "tip": "direct",
     "rigid_tip": "rigid",
     "coordinates": "inverse",
+    None: "correction",
 }
 SELECTED = "_selected"
-TIMES = ("microseconds_single", "microseconds_batched")
+TIMES = {"single (us)": "microseconds_single", "batched (us)": "microseconds_batched"}
+STEPS = {
+    "gradient_descent": inversion_step_operations,
+    "gauss_newton": gauss_newton_step_operations,
+}
 
 
 @dataclass(frozen=True)
@@ -78,19 +78,9 @@ class Results:
     shape: Mapping[str, Any]
 
     @property
-    def geometry(self) -> CraneGeometry:
-        """Rigid dimensions."""
-        return geometry_of(self.section.machine)
-
-    @property
     def methods(self) -> dict[str, Settings]:
         """Methods that compensate, by name."""
         return {k: method for k, method in self.section.methods.items() if k != "none"}
-
-    @property
-    def networks(self) -> Mapping[str, Any]:
-        """Parameters of the networks by name."""
-        return self.section.networks
 
     @cached_property
     def kept(self) -> pd.DataFrame:
@@ -103,38 +93,33 @@ class Results:
         return list(self.section.conditions["published"].points)  # type: ignore[union-attr]
 
     @property
-    def initial(self) -> Array:
-        """Strokes (k, 3) in m at which all methods start."""
-        return CraneManipulator(self.geometry).initial_positions(np.array(self.points))
-
-    @property
-    def corrections(self) -> dict[str, Array]:
+    def corrections(self) -> dict[str, np.ndarray]:
         """What networks of published size that correct another learn from (n, 2), m."""
         return {
             name: correction(self.kept, self.trained[network.corrects])
-            for name, network in self.networks.items()
+            for name, network in self.section.networks.items()
             if network.corrects and not network.is_selected
         }
-
-    @property
-    def slice_samples(self) -> pd.DataFrame:
-        """Samples of the grid on the line of poses of the study of fitting."""
-        line = self.section.studies.fitting
-        return self.kept[on_line(self.kept, line.jib, line.extension, line.payload)]
 
     @cached_property
     def statistics(self) -> dict[str, dict[str, float]]:
         """Statistics under the published conditions by method, m."""
         return {label: statistics(frame) for label, frame in self.errors.items()}
 
-    @property
-    def published_columns(self) -> dict[str, str | None]:
-        """Published column that stands beside each method; None: there is none."""
-        known = self.published["positioning_errors"].columns
-        return {
-            label: method.method if method.method in known else None
-            for label, method in self.methods.items()
-        }
+    @cached_property
+    def workspace_statistics(self) -> dict[str, dict[str, float]]:
+        """Statistics at random targets by method, m."""
+        frames = self.workspace.items()
+        return {label: workspace_statistics(frame) for label, frame in frames if len(frame)}
+
+    def compared(self, labels: list[str]) -> pd.DataFrame:
+        """STATISTICS (rows) in mm: columns LABEL and "LABEL published", NaN where nothing is."""
+        published, columns = self.published["positioning_errors"].set_index("statistic"), {}
+        for label in labels:
+            theirs = published.get(self.section.methods[label].method)
+            columns[label] = {name: MM * self.statistics[label][name] for name in STATISTICS}
+            columns[f"{label} published"] = dict.fromkeys(STATISTICS) if theirs is None else theirs
+        return pd.DataFrame(columns, list(STATISTICS), dtype=float)
 
     @property
     def groups(self) -> dict[str, list[str]]:
@@ -148,21 +133,11 @@ class Results:
             groups[names.get(label, "variants")].append(label)
         return groups
 
-    def kind(self, name: str) -> str:
-        """Of network `name`, see KIND."""
-        network = self.networks[name]
-        return "correction" if network.corrects else KIND[network.learns]
-
     def published_size(self, name: str) -> int | None:
-        """Published n_hidden of the kind of network `name`; None if there is none."""
+        """Published n_hidden of networks that learn what network `name` does, if there is one."""
         sizes = self.published["network_sizes"].set_index("network")["n_hidden"]
-        return int(sizes[self.kind(name)]) if self.kind(name) in sizes else None
-
-    def n_learnt(self, name: str) -> int:
-        """Samples that network `name` learns from."""
-        return len(
-            learnt_rows(self.kept, self.networks[name].learns or "correction", self.geometry)
-        )
+        kind = KIND[self.section.networks[name].learns]
+        return int(sizes[kind]) if kind in sizes else None
 
     def query_operations(self, label: str) -> float | None:
         """Operations of its network that a query of method `label` takes, on average."""
@@ -172,77 +147,67 @@ class Results:
         network = self.trained[method.network]
         if not isinstance(method, InvertedSettings):
             return getattr(method, "n_corrections", 1) * forward_operations(network)
-        step = {
-            "gradient_descent": inversion_step_operations,
-            "gauss_newton": gauss_newton_step_operations,
-        }[method.inversion.kind](network, len(network.inputs) - 1)
+        step = STEPS[method.inversion.kind](network, len(network.inputs) - 1)
         n_steps = float(self.errors[label]["n_iterations"].mean())
         return normalisation_operations(network) + n_steps * step
 
     def query_cost(self) -> pd.DataFrame:
         """Operations and microseconds of a query of every method, and its mean error."""
-        frame = pd.DataFrame({"method": list(self.methods)})
-        frame["operations"] = [self.query_operations(k) for k in frame["method"]]
-        theirs = self.published["operations"].set_index("method")["operations"].astype(float)
-        frame["published"] = [
-            theirs.get(k) if k == self.methods[k].method else None for k in frame["method"]
+        published = self.published["operations"].set_index("method")["operations"]
+        times = self.query_times.set_index("method")
+        rows = [
+            {
+                "method": label,
+                "operations": self.query_operations(label),
+                "published": published.get(label) if label == method.method else None,
+                **{title: times[name].get(label) for title, name in TIMES.items()},
+                "mean R (mm)": MM * self.statistics[label]["mean_error"],
+            }
+            for label, method in self.methods.items()
         ]
-        times = self.query_times.set_index("method").reindex(frame["method"])
-        frame[["single (us)", "batched (us)"]] = times[list(TIMES)].to_numpy()
-        frame["mean R (mm)"] = [MM * self.statistics[k]["mean_error"] for k in frame["method"]]
-        return frame.astype({"operations": float, "published": float})
+        return pd.DataFrame(rows).astype(dict.fromkeys(["operations", "published", *TIMES], float))
 
 
-def read(section: Section, data: Path) -> Results:
-    """Results of the stages under `data`, beside the published values."""
-    training = {
-        name: pd.read_csv(data / "networks" / f"{name}.restarts.csv") for name in section.networks
-    }
-    errors = {
-        conditions: {
-            label: read_table(data / "errors" / conditions / f"{label}.parquet")
-            for label in section.methods
-        }
-        for conditions in ("published", "workspace")
-    }
-    spread = {
-        label: data / "errors" / "published" / f"{label}.spread.parquet"
-        for label in section.methods
-    }
+def read(section: Section) -> Results:
+    """Results of the stages, beside the published values."""
+    data, networks, methods = section.data, section.networks, section.methods
+    training = {name: pd.read_csv(data / f"networks/{name}.restarts.csv") for name in networks}
+    spread = {label: data / f"errors/published/{label}.spread.parquet" for label in methods}
     times = read_csv(
-        BENCHMARKS / "positioning.csv", TIMES, ("method", "settings"), ("method",)
+        BENCHMARKS / "positioning.csv", list(TIMES.values()), ("method", "settings"), ("method",)
     ).query("method in @section.methods")
     keys = [query_key(section, name) for name in times["method"]]
-    studies, sizes = data / "studies", data / "sizes"
+    errors, workspace = (
+        {label: read_table(data / f"errors/{name}/{label}.parquet") for label in methods}
+        for name in ("published", "workspace")
+    )
     return Results(
         section=section,
-        spring_stiffness=read_json(data / "constants" / "spring.json")["spring_stiffness"],
-        grid=read_table(data / "samples" / "grid.parquet"),
-        selection=read_table(data / "samples" / "selection.parquet"),
-        errors=errors["published"],
-        workspace=errors["workspace"],
+        spring_stiffness=read_json(data / "constants/spring.json")["spring_stiffness"],
+        grid=read_table(data / "samples/grid.parquet"),
+        selection=read_table(data / "samples/selection.parquet"),
+        errors=errors,
+        workspace=workspace,
         spread={label: read_table(path) for label, path in spread.items() if path.is_file()},
         published=published(),
-        mesh=read_table(studies / "mesh.parquet"),
+        mesh=read_table(data / "studies/mesh.parquet"),
         training=pd.concat(training, names=["network"]).reset_index(level="network"),
         studies={
             name: (
-                by_size(read_table(sizes / f"{name}.parquet")),
-                read_layers(sizes / f"{name}.json")[0],
+                by_size(read_table(data / f"sizes/{name}.parquet")),
+                read_layers(data / f"sizes/{name}.json")[0],
             )
-            for name, network in section.networks.items()
+            for name, network in networks.items()
             if network.is_selected
         },
-        trained={
-            name: load_network(data / "networks" / f"{name}.json")[0] for name in section.networks
-        },
-        tolerances=read_table(studies / "tolerance.parquet"),
-        fitting=read_table(studies / "fitting.parquet"),
+        trained={name: load_network(data / f"networks/{name}.json")[0] for name in networks},
+        tolerances=read_table(data / "studies/tolerance.parquet"),
+        fitting=read_table(data / "studies/fitting.parquet"),
         query_times=times[times["settings"] == keys],
         training_curves=read_csv(
             BENCHMARKS / "training_methods.csv", ("seconds", "error"), ("trainer",)
         ),
-        shape=read_json(studies / "shape.json"),
+        shape=read_json(data / "studies/shape.json"),
     )
 
 
@@ -256,17 +221,11 @@ def query_key(section: Section, name: str) -> str:
 
 def published() -> dict[str, pd.DataFrame]:
     """Values of the thesis by file."""
-    files: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-        "positioning_errors": (
-            ("none", "combined", "direct", "modular", "inverse"),
-            ("statistic",),
-        ),
-        "network_sizes": (("n_hidden",), ("network",)),
-        "operations": (("operations",), ("method",)),
-        "without_worst_points": (("x", "y", "max_error", "mean_error"), ("method", "x", "y")),
-        "tolerance_study": (("mean_iterations", "max_iterations"), ("method", "tolerance")),
+    keys = {
+        "positioning_errors": ("statistic",),
+        "network_sizes": ("network",),
+        "operations": ("method",),
+        "without_worst_points": ("method", "x", "y"),
+        "tolerance_study": ("method", "tolerance"),
     }
-    return {
-        name: read_csv(REFERENCE / f"{name}.csv", numbers, keys[:1], keys)
-        for name, (numbers, keys) in files.items()
-    }
+    return {name: read_csv(REFERENCE / f"{name}.csv", (), key, key) for name, key in keys.items()}
