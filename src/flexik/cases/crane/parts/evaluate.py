@@ -1,7 +1,7 @@
 """Errors of every method under every set of conditions, a long table each.
 
 A part CONDITIONS/METHOD; `.spread.parquet` beside those of given points: the errors of the method
-with each of the networks that its training started, of which the best by selection is its own.
+with the networks of the best restarts, of which the very best by selection error is its own.
 """
 
 import functools
@@ -29,8 +29,7 @@ from flexik.datasets.tables import Field, read_table
 from flexik.evaluation.conditions import Conditions
 from flexik.evaluation.errors import Judge, evaluate, fields_of, statistics, tip_judge
 from flexik.kinematics.crane_manipulator import CraneManipulator
-from flexik.learning.storage import load_networks
-from flexik.learning.training import TrainingRecord
+from flexik.learning.storage import Trained, TrainingRecord, load_networks
 from flexik.machines.crane import Machine
 from flexik.parameters.conditions import Points
 from flexik.positioning.method import Columns, Method, Settings
@@ -38,6 +37,8 @@ from flexik.positioning.registry import Build
 
 # Many rows at once pay for searches, of which a few take most steps
 ROWS = 2500
+# Networks that might have been chosen
+N_SPREAD = 10
 SPREAD_FIELDS = (
     Field("restart", "1", "start of the network's training, from 0", "int64"),
     Field("selection_error", "1", "of that network: the least is the method's own"),
@@ -104,7 +105,7 @@ def prepare(
     asked = with_network(network)
     items: list[Any] = [(asked, piece) for piece in conditions.chunks(ROWS)]
     n_pieces, columns = len(items), columns_of(machine)
-    starts = [] if restarts is None else load_networks(restarts)
+    starts = [] if restarts is None else _best(load_networks(restarts))
     items += [(with_network(other), conditions) for other, _ in starts]
 
     def finish(results: list[Mapping[str, NDArray]]) -> Mapping[str, Writer]:
@@ -131,6 +132,12 @@ def _errors(
 ) -> Mapping[str, NDArray]:
     method, conditions = item
     return evaluate(method, conditions, judge, columns)
+
+
+def _best(starts: Sequence[Trained]) -> list[Trained]:
+    """Those of the least selection errors, in the order of their restarts."""
+    best = sorted(starts, key=lambda start: start[1].rank)[:N_SPREAD]
+    return sorted(best, key=lambda start: start[1].restart)
 
 
 def _spread(
