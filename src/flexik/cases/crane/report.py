@@ -28,7 +28,7 @@ CONDITION_COLUMNS = [
 def report(section: Section) -> None:
     """Write tables, figures and page."""
     sections = section.machine.structure.beams.sections.values()
-    made_from = [*sections, *sorted(REFERENCE.glob("*.csv"))]
+    made_from: list[Path | str] = [*sections, *sorted(REFERENCE.glob("*.csv"))]
     whole = content(read(section)) | measured(section)
     write_case(section, Path(__file__).with_name("page.md.j2"), whole, made_from)
 

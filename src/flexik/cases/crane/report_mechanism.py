@@ -15,20 +15,23 @@ from flexik.reporting.report import Drawing, draw
 from flexik.reporting.style import MM
 
 Array = NDArray[np.float64]
-Points = dict[str, Array]
+Points = Mapping[str, Array]
 
-BEAMS = ("pillar", "lift", "jib", "extension")
-# Half of the depth drawn, m; the sections are known by their stiffness, not by their outline
-HALF_DEPTH = {"pillar": 0.085, "lift": 0.095, "jib": 0.085, "extension": 0.055}
-COLOUR = dict(zip(BEAMS, ("#5A5A5A", style.BLUE, style.VERMILION, style.ORANGE), strict=True))
-# Colour and width of the links, and the corners that they are drawn through
-LINK_LOOKS = {
-    "pillar": {"color": COLOUR["pillar"], "linewidth": 1.6},
+# Colour, and half of the depth drawn, m; sections are known by their stiffness, not their outline
+BEAMS: dict[str, tuple[str, float]] = {
+    "pillar": ("#5A5A5A", 0.085),
+    "lift": (style.BLUE, 0.095),
+    "jib": (style.VERMILION, 0.085),
+    "extension": (style.ORANGE, 0.055),
+}
+# Links, and the pins that each is drawn through
+LINK_LOOKS: dict[str, dict[str, Any]] = {
+    "pillar": {"color": BEAMS["pillar"][0], "linewidth": 1.6},
     "cylinder": {"color": style.GREY, "linewidth": 0.7},
-    "lift arm": {"color": COLOUR["lift"], "linewidth": 1.6},
+    "lift arm": {"color": BEAMS["lift"][0], "linewidth": 1.6},
     "rocker, coupler": {"color": style.GREEN, "linewidth": 0.7},
-    "jib": {"color": COLOUR["jib"], "linewidth": 1.6},
-    "extension": {"color": COLOUR["extension"], "linewidth": 1.6},
+    "jib": {"color": BEAMS["jib"][0], "linewidth": 1.6},
+    "extension": {"color": BEAMS["extension"][0], "linewidth": 1.6},
 }
 LINKS = (
     ("pillar", "foot lift_pivot"),
@@ -39,8 +42,8 @@ LINKS = (
     ("jib", "jib_pivot coupler_pin extension_start"),
     ("extension", "extension_start tip"),
 )
-
-# Pins, the beam each one moves with, and where its letter stands (points, in the lift frame)
+# Pins, the beam each one moves with, and where its letter stands (points; in the lift frame, but
+# for B and C)
 PINS = {
     "C": ("lift_cylinder_base", "pillar", (14.0, -5.0)),
     "B": ("lift_pivot", "pillar", (-13.0, 8.0)),
@@ -49,8 +52,22 @@ PINS = {
     "F": ("rocker_pivot", "lift", (-12.0, -14.0)),
     "G": ("jib_pivot", "lift", (8.0, -16.0)),
     "I": ("coupler_pin", "jib", (17.0, 6.0)),
+    "H": ("rocker_head", "", (-3.0, 16.0)),
 }
-HEAD = ("H", (-3.0, 16.0))
+# Texts, how far between which two places they point, and where they stand (points)
+LABELS = (
+    ("pillar", ("foot", "head", 0.5), (-40.0, 0.0), "right"),
+    ("ground spring", ("foot", "foot", 0.0), (50.0, 0.0), "left"),
+    ("lift arm", ("B", "G", 0.6), (12.0, -30.0), "left"),
+    ("lift cylinder\nstroke {0:.0f} mm", ("C", "D", 0.5), (28.0, -8.0), "left"),
+    ("jib cylinder\nstroke {1:.0f} mm", ("E", "H", 0.4), (-24.0, 44.0), "right"),
+    ("rocker", ("F", "H", 0.5), (-40.0, 45.0), "right"),
+    ("coupler", ("H", "I", 0.5), (34.0, 34.0), "left"),
+    ("jib", ("rear pad", "front pad", 0.5), (-28.0, -34.0), "right"),
+    ("rear pad", ("rear pad", "rear pad", 0.0), (4.0, 46.0), "center"),
+    ("front pad", ("front pad", "front pad", 0.0), (20.0, 34.0), "left"),
+    ("extension\nstroke {2:.0f} mm", ("front pad", "tip", 0.5), (-20.0, -44.0), "right"),
+)
 ROOM = np.array([[-0.95, -0.5], [0.9, 0.9]])  # about all points, for labels, m
 
 
@@ -77,29 +94,29 @@ def crane(geometry: CraneGeometry, shape: Mapping[str, Any]) -> Drawing:
     shape : strokes (3,) in m; payload in kg; exaggeration of the deflection; beams and reference:
         for each of BEAMS the nodes (k, 2) in m, in equilibrium and rigid; tip, rigid_tip (2,) in m.
     """
-    reference = {name: np.asarray(shape["reference"][name], dtype=float) for name in BEAMS}
+    rigid = {name: np.asarray(shape["reference"][name], dtype=float) for name in BEAMS}
     bent = {
         name: nodes + float(shape["exaggeration"]) * (np.asarray(shape["beams"][name]) - nodes)
-        for name, nodes in reference.items()
+        for name, nodes in rigid.items()
     }
-    strokes, rigid_tip = np.asarray(shape["strokes"], dtype=float), reference["extension"][-1]
+    strokes = np.asarray(shape["strokes"], dtype=float)
     posed = pose(geometry, strokes[None])
-    names = {letter: field for letter, (field, _, _) in PINS.items()} | {"H": "rocker_head"}
-    rigid = {letter: np.asarray(getattr(posed, field)[0]) for letter, field in names.items()}
-    pins, angle = _carry_pins(rigid, reference, bent), float(posed.lift_angle[0])
-    every = [*reference.values(), *bent.values(), np.array(list(rigid.values()))]
-    every.append(bent["extension"][-1:] - [0.0, 0.35])  # the weight
-    low, high = (f(np.concatenate(every), axis=0) for f in (np.min, np.max))
-    low, high = low + ROOM[0], high + ROOM[1]
+    rigid_pins = {letter: getattr(posed, field)[0] for letter, (field, _, _) in PINS.items()}
+    pins, angle = _carry_pins(rigid_pins, rigid, bent), float(posed.lift_angle[0])
+    # with room for the weight
+    ends = [list(rigid_pins.values()), bent["extension"][-1:] - [0.0, 0.35]]
+    every = np.concatenate([*rigid.values(), *bent.values(), *ends])
+    low, high = every.min(axis=0) + ROOM[0], every.max(axis=0) + ROOM[1]
     height = float(np.clip((style.WIDTH - 0.7) * (high - low)[1] / (high - low)[0] + 1.1, 3.5, 9.0))
+    tips = [rigid["extension"][-1], bent["extension"][-1]]
     return draw(
         chart,
-        *_rigid(reference, rigid),
+        *_rigid(rigid, rigid_pins),
         *_ground(bent["pillar"][0]),
         *_beams(bent, pins),
         *_cylinders(geometry, pins),
-        *_ends([rigid_tip, bent["extension"][-1]], bent, pins),
-        _texts([("rigid tip", rigid_tip, (9.0, 7.0), "left")]),
+        *_points(tips, bent, pins),
+        _texts([("rigid tip", tips[0], (9.0, 7.0), "left")]),
         *_labels(bent, pins, strokes, angle, float(shape["payload"])),
         x=Axis("x (m)", limits=(low[0], high[0])),
         y=Axis("y (m)", limits=(low[1], high[1])),
@@ -120,11 +137,12 @@ def _title(shape: Mapping[str, Any]) -> str:
     )
 
 
-def _carry_pins(rigid: Points, reference: Points, bent: Points) -> Points:
+def _carry_pins(rigid: Points, reference: Points, bent: Points) -> dict[str, Array]:
     """Pins moved with their beams; H keeps the lengths of its rods to first order."""
     pins = {
         letter: _carry(reference[beam], bent[beam], rigid[letter])
         for letter, (_, beam, _) in PINS.items()
+        if beam
     }
     rods = np.array([rigid["H"] - rigid["F"], rigid["H"] - rigid["I"]])
     ends = np.array([pins["F"] - rigid["F"], pins["I"] - rigid["I"]])
@@ -133,13 +151,19 @@ def _carry_pins(rigid: Points, reference: Points, bent: Points) -> Points:
 
 def _carry(reference: Array, bent: Array, point: Array) -> Array:
     """Move `point` (2,) with the nearest segment of a polyline (k, 2), as if fixed to it."""
-    start, along = reference[:-1], np.diff(reference, axis=0)
+    k, share, foot = _foot(reference, point)
+    moved = bent[k] + share * (bent[k + 1] - bent[k])
+    before, after = (np.arctan2(*(axis[k + 1] - axis[k])[::-1]) for axis in (reference, bent))
+    return moved + _turned(after - before, point - foot)
+
+
+def _foot(axis: Array, point: Array) -> tuple[int, float, Array]:
+    """Segment of the polyline `axis` (k, 2) that is nearest to `point`, share of it, and foot."""
+    start, along = axis[:-1], np.diff(axis, axis=0)
     share = np.clip(np.sum((point - start) * along, axis=1) / np.sum(along**2, axis=1), 0.0, 1.0)
     feet = start + share[:, None] * along
     k = int(np.argmin(np.hypot(*(point - feet).T)))
-    moved = bent[k] + share[k] * (bent[k + 1] - bent[k])
-    turn = np.subtract(*(np.arctan2(d[1], d[0]) for d in (bent[k + 1] - bent[k], along[k])))
-    return moved + _turned(float(turn), point - feet[k])
+    return k, float(share[k]), feet[k]
 
 
 def _turned(angle: float, vector: Any) -> Array:
@@ -150,7 +174,7 @@ def _turned(angle: float, vector: Any) -> Array:
 def _outline(axis: Array, half: float) -> Array:
     """Outline (2k, 2) of a beam of depth 2 `half` along the polyline `axis` (k, 2)."""
     tangent = np.gradient(axis, axis=0)
-    tangent /= np.hypot(tangent[:, 0], tangent[:, 1])[:, None]
+    tangent /= np.hypot(*tangent.T)[:, None]
     normal = half * np.column_stack([-tangent[:, 1], tangent[:, 0]])
     return np.concatenate([axis + normal, (axis - normal)[::-1]])
 
@@ -160,11 +184,13 @@ def _layer(points: Any, mark: str, **look: Any) -> Layer:
     return Layer(frame, "x", "y", mark, label="", look=look)
 
 
-def _rigid(reference: Points, pins: Points) -> list[Layer]:
-    grey = {"color": "#F0F0F0", "edgecolor": style.GREY, "linewidth": 0.8, "zorder": 1}
-    bodies = [_layer(_outline(reference[b], HALF_DEPTH[b]), "area", **grey) for b in BEAMS]
+def _rigid(axes: Points, pins: Points) -> list[Layer]:
+    pale = {"color": "#F0F0F0", "edgecolor": style.GREY, "linewidth": 0.8, "zorder": 1}
+    grey = {"color": style.GREY, "linewidth": 0.8, "zorder": 1}
     rods = [[pins[letter] for letter in letters] for letters in ("CD", "EH", "FHI")]
-    return bodies + [_layer(r, "-", color=style.GREY, linewidth=0.8, zorder=1) for r in rods]
+    outlines = [_outline(axes[name], half) for name, (_, half) in BEAMS.items()]
+    bodies = [_layer(outline, "area", **pale) for outline in outlines]
+    return bodies + [_layer(rod, "-", **grey) for rod in rods]
 
 
 def _ground(foot: Array) -> list[Layer]:
@@ -181,39 +207,31 @@ def _ground(foot: Array) -> list[Layer]:
 def _beams(bent: Points, pins: Points) -> list[Layer]:
     """Beams, and the rigid arms from their axes to pins beside them."""
     found = []
-    for name in BEAMS:
-        look, layer = {"color": COLOUR[name]}, 2.8 if name == "extension" else 3.0
+    for name, (colour, half) in BEAMS.items():
+        axis, look, level = bent[name], {"color": colour}, 2.8 if name == "extension" else 3.0
         for letter, (_, beam, _) in PINS.items():
             if beam == name or (name == "jib" and letter == "G"):
-                arm = [_nearest(bent[name], pins[letter]), pins[letter]]
-                found.append(_layer(arm, "-", linewidth=9, zorder=layer - 0.1, **look))
-        outline = _outline(bent[name], HALF_DEPTH[name])
-        found.append(_layer(outline, "area", zorder=layer, **look))
+                arm = [_foot(axis, pins[letter])[2], pins[letter]]
+                found.append(_layer(arm, "-", linewidth=9, zorder=level - 0.1, **look))
+        found.append(_layer(_outline(axis, half), "area", zorder=level, **look))
     dashed = {"color": "white", "linewidth": 1.0, "linestyle": (0, (5, 4)), "zorder": 3.1}
     return [*found, _layer([bent["extension"][0], bent["jib"][-1]], "-", **dashed)]
 
 
-def _nearest(axis: Array, pin: Array) -> Array:
-    fine = np.linspace(0, len(axis) - 1, 400)
-    points = np.column_stack([np.interp(fine, np.arange(len(axis)), c) for c in axis.T])
-    return points[np.argmin(np.hypot(*(points - pin).T))]
-
-
 def _cylinders(geometry: CraneGeometry, pins: Points) -> list[Layer]:
     """Cylinders, rocker and coupler."""
-    found = []
+    found, dark = [], {"color": "#3D3D3D", "solid_capstyle": "butt"}
     lengths = geometry.lift_cylinder_length, geometry.jib_cylinder_length
-    for (base, head), length in zip((("C", "D"), ("E", "H")), lengths, strict=True):
+    for (base, head), length in zip(("CD", "EH"), lengths, strict=True):
         start, end = pins[base], pins[head]
         barrel = start + 0.9 * length * (end - start) / np.hypot(*(end - start))
-        dark = {"color": "#3D3D3D", "solid_capstyle": "butt"}
         found.append(_layer([start, end], "-", color="#A6A6A6", linewidth=4, zorder=4))
         found.append(_layer([start, barrel], "-", linewidth=8, zorder=4.1, **dark))
     rods = [pins[letter] for letter in "FHI"]
     return [*found, _layer(rods, "-", color=style.GREEN, linewidth=6, zorder=4.2)]
 
 
-def _ends(tips: list[Array], bent: Points, pins: Points) -> list[Layer]:
+def _points(tips: list[Array], bent: Points, pins: Points) -> list[Layer]:
     """Pads where extension and jib touch, pins, the rigid and the loaded one of the `tips`."""
     pads, ink = [bent["extension"][0], bent["jib"][-1]], {"color": style.INK, "zorder": 7}
     white = ink | {"markerfacecolor": "white"}
@@ -229,38 +247,24 @@ def _ends(tips: list[Array], bent: Points, pins: Points) -> list[Layer]:
 def _labels(
     bent: Points, pins: Points, strokes: Array, angle: float, payload: float
 ) -> list[Layer]:
-    lift, jib, extension = (f"stroke {MM * s:.0f} mm" for s in strokes)
-    ends = {name: (bent[name][0], bent[name][-1]) for name in BEAMS}
-    pads = ends["extension"][0], ends["jib"][1]
-    tip, boxed = ends["extension"][1], {"facecolor": style.PALE, "edgecolor": style.INK}
-    over = tuple(_turned(angle, (-24.0, 44.0)))
-
-    def middle(a: Array, b: Array, share: float = 0.5) -> Array:
-        return (1 - share) * a + share * b
-
-    named = [
-        ("pillar", middle(*ends["pillar"]), (-40.0, 0.0), "right"),
-        ("ground spring", ends["pillar"][0], (50.0, 0.0), "left"),
-        ("lift arm", middle(pins["B"], pins["G"], 0.6), (12.0, -30.0), "left"),
-        (f"lift cylinder\n{lift}", middle(pins["C"], pins["D"]), (28.0, -8.0), "left"),
-        (f"jib cylinder\n{jib}", middle(pins["E"], pins["H"], 0.4), over, "right"),
-        ("rocker", middle(pins["F"], pins["H"]), (-40.0, 45.0), "right"),
-        ("coupler", middle(pins["H"], pins["I"]), (34.0, 34.0), "left"),
-        ("jib", middle(*pads), (-28.0, -34.0), "right"),
-        ("rear pad", pads[0], (4.0, 46.0), "center"),
-        ("front pad", pads[1], (20.0, 34.0), "left"),
-        (f"extension\n{extension}", middle(pads[1], tip), (-20.0, -44.0), "right"),
-    ]
-    letters = {letter: offset for letter, (_, _, offset) in PINS.items()} | dict([HEAD])
-    pin_names = [
+    places = {**pins, "foot": bent["pillar"][0], "head": bent["pillar"][-1]}
+    places |= {"rear pad": bent["extension"][0], "front pad": bent["jib"][-1]}
+    places["tip"] = tip = bent["extension"][-1]
+    named = []
+    for text, (start, end, share), offset, side in LABELS:
+        at = (1 - share) * places[start] + share * places[end]
+        along = _turned(angle, offset) if start == "E" else offset
+        named.append((text.format(*MM * strokes), at, along, side))
+    letters = [
         (letter, pins[letter], offset if letter in "BC" else _turned(angle, offset), "center")
-        for letter, offset in letters.items()
+        for letter, (_, _, offset) in PINS.items()
     ]
+    box = {"boxstyle": "square,pad=0.4", "facecolor": style.PALE, "edgecolor": style.INK}
     weight = [(f"{payload:g} kg", tip, (0.0, -32.0), "center")]
     return [
         _texts(named, leader=True),
-        _texts([*pin_names, ("loaded tip", tip, (11.0, 2.0), "left")]),
-        _texts(weight, leader=True, bbox={"boxstyle": "square,pad=0.4", **boxed}, path_effects=[]),
+        _texts([*letters, ("loaded tip", tip, (11.0, 2.0), "left")]),
+        _texts(weight, leader=True, bbox=box, path_effects=[]),
     ]
 
 

@@ -114,7 +114,8 @@ class Results:
 
     def compared(self, labels: list[str]) -> pd.DataFrame:
         """STATISTICS (rows) in mm: columns LABEL and "LABEL published", NaN where nothing is."""
-        published, columns = self.published["positioning_errors"].set_index("statistic"), {}
+        published = self.published["positioning_errors"].set_index("statistic")
+        columns: dict[str, Any] = {}
         for label in labels:
             theirs = published.get(self.section.methods[label].method)
             columns[label] = {name: MM * self.statistics[label][name] for name in STATISTICS}
