@@ -5,8 +5,9 @@ the training record. The formula is that of `flexik.learning.perceptron.Network`
 """
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -16,11 +17,49 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from flexik import files
 from flexik.errors import DataError, FlexikError
 from flexik.learning.perceptron import Network, Normalisation, Quantity
-from flexik.learning.training import TrainingRecord
+from flexik.learning.stopping import StopReason
 
 FORMAT, VERSION = "flexik-networks", 3
-Trained = tuple[Network, TrainingRecord]
 Arrays = Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class TrainingRecord:
+    """How a network came to be.
+
+    Attributes
+    ----------
+    trainer : kind of the trainer
+    seed, restart : the initial weights are drawn from the NumPy generator of (seed, restart)
+    stop_reason : why the run ended
+    errors : mean squared error of the normalised outputs per iteration, the first the initial
+        one; empty when the run gave no usable network
+    kept : the iteration the network is of; the last one unless the errors rose or the settings
+        asked for selection patience
+    selection_error : root mean square of the normalised output errors on the selection data, or
+        what the judge of the run says; None where there is neither, or it is not finite
+    """
+
+    trainer: str
+    seed: int
+    restart: int
+    stop_reason: StopReason
+    errors: tuple[float, ...]
+    kept: int
+    selection_error: float | None
+
+    @property
+    def training_error(self) -> float:
+        """Root mean square of the normalised output errors; nan without a usable network."""
+        return math.sqrt(self.errors[self.kept]) if self.errors else math.nan
+
+    @property
+    def rank(self) -> float:
+        """Selection error, inf when there is none to compare."""
+        return math.inf if self.selection_error is None else self.selection_error
+
+
+Trained = tuple[Network, TrainingRecord]
 
 
 class _Section(BaseModel):

@@ -31,7 +31,8 @@ from flexik.learning.perceptron import (
     quantities,
 )
 from flexik.learning.problem import Problem, problem
-from flexik.learning.stopping import Minimum, StopReason
+from flexik.learning.stopping import Minimum
+from flexik.learning.storage import TrainingRecord
 from flexik.learning.weights import Weights, initial_weights, uniform_weights
 from flexik.parameters.trainers import Stopping
 
@@ -73,42 +74,6 @@ class Architecture:
     def hidden_sizes(self) -> tuple[int, ...]:
         """Units of every hidden layer."""
         return self.n_hidden if isinstance(self.n_hidden, tuple) else (self.n_hidden,)
-
-
-@dataclass(frozen=True)
-class TrainingRecord:
-    """How a network came to be.
-
-    Attributes
-    ----------
-    trainer : kind of the trainer
-    seed, restart : the initial weights are drawn from the NumPy generator of (seed, restart)
-    stop_reason : why the run ended
-    errors : mean squared error of the normalised outputs per iteration, the first the initial
-        one; empty when the run gave no usable network
-    kept : the iteration the network is of; the last one unless the errors rose or the settings
-        asked for selection patience
-    selection_error : root mean square of the normalised output errors on the selection data, or
-        what the judge of the run says; None where there is neither, or it is not finite
-    """
-
-    trainer: str
-    seed: int
-    restart: int
-    stop_reason: StopReason
-    errors: tuple[float, ...]
-    kept: int
-    selection_error: float | None
-
-    @property
-    def training_error(self) -> float:
-        """Root mean square of the normalised output errors; nan without a usable network."""
-        return math.sqrt(self.errors[self.kept]) if self.errors else math.nan
-
-    @property
-    def rank(self) -> float:
-        """Selection error, inf when there is none to compare."""
-        return math.inf if self.selection_error is None else self.selection_error
 
 
 @dataclass(frozen=True, eq=False)
