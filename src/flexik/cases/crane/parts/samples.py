@@ -34,48 +34,36 @@ SHOWN_FAILURES = 10
 def parts(section: Section) -> list[Part]:
     """`grid` and `selection`, tables of SAMPLE_FIELDS."""
     given = section.samples
-    settings = {
+    shared = {
         "machine": section.machine,
         "minimum_tip_x": given.minimum_tip_x,
         "maximum_failed_share": given.maximum_failed_share,
     }
-    inputs = model_inputs(section)
     return [
-        Part("grid", prepare_grid, {**settings, "grid": given.grid}, inputs),
-        Part("selection", prepare_selection, {**settings, "selection": given.selection}, inputs),
+        Part(name, prepare, {**shared, "name": name, "drawn": drawn}, model_inputs(section))
+        for name, drawn in (("grid", given.grid), ("selection", given.selection))
     ]
 
 
-def prepare_grid(
+def prepare(
     *,
+    name: str,
     machine: Machine,
     minimum_tip_x: float,
     maximum_failed_share: float,
-    grid: Grid,
+    drawn: Grid | Selection,
     spring: Path,
     sections: dict[str, Path],
 ) -> Work:
-    """The training grid, in pieces of equal extension."""
-    pieces = GridParts(**{name: axis(**dict(getattr(grid, name))) for name in GridParts.AXES})
+    """The training grid, in pieces of equal extension, or the random set."""
+    pieces: Sequence[Samples]
+    if isinstance(drawn, Grid):
+        pieces = GridParts(**{n: axis(**dict(getattr(drawn, n))) for n in GridParts.AXES})
+    else:
+        given = drawn.n_samples, drawn.payload, minimum_tip_x, drawn.seed
+        pieces = split(random_samples(geometry_of(machine), *given))
     function = functools.partial(solve_samples, flexible(machine, spring), minimum_tip_x)
-    return Work(function, pieces, functools.partial(_finish, "grid", maximum_failed_share))
-
-
-def prepare_selection(
-    *,
-    machine: Machine,
-    minimum_tip_x: float,
-    maximum_failed_share: float,
-    selection: Selection,
-    spring: Path,
-    sections: dict[str, Path],
-) -> Work:
-    """The random set."""
-    given = selection.n_samples, selection.payload, minimum_tip_x, selection.seed
-    drawn = random_samples(machine.geometry, *given)
-    function = functools.partial(solve_samples, flexible(machine, spring), minimum_tip_x)
-    finish = functools.partial(_finish, "selection", maximum_failed_share)
-    return Work(function, split(drawn), finish)
+    return Work(function, pieces, functools.partial(_finish, name, maximum_failed_share))
 
 
 def _finish(
