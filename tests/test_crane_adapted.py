@@ -393,7 +393,7 @@ TARGETS = np.array([[3.8, 1.75], [3.0, 0.95], [3.8, 0.15], [4.6, 2.5], [2.4, -1.
 def conditions(crane):
     """Strokes (12, 3) and payload (12,), two loads a target."""
     targets = np.repeat(TARGETS, 2, axis=0)
-    strokes = inverse_with_smallest_extension(crane.geometry, targets).strokes
+    strokes = inverse_with_smallest_extension(crane.geometry, targets).values
     return strokes, np.tile([0.0, 172.0], len(TARGETS))
 
 

@@ -183,7 +183,7 @@ def test_poses_on_the_branch_are_those_the_rigid_inverse_takes(geometry):
     # those that are not have a tip that other strokes have too
     for strokes in table.loc[~found, ["lift_stroke", "jib_stroke", "extension_stroke"]].to_numpy():
         tip = forward(geometry, strokes[None])
-        other = inverse(geometry, tip, strokes[2]).strokes
+        other = inverse(geometry, tip, strokes[2]).values
         assert np.abs(other[0, :2] - strokes[:2]).max() > 0.01
         assert (other >= 0.0).all() and (other <= geometry.stroke_maximum).all()
         assert forward(geometry, other) == pytest.approx(tip, abs=1e-9)

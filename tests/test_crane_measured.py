@@ -70,7 +70,7 @@ def test_errors_of_a_crane_as_built_are_those_of_its_tips():
     still = study({"repeatability": 0.0})
     table = pd.DataFrame(adaptation.errors_of(still, 2))
     targets = table[:4][["target_x", "target_y"]].to_numpy()
-    strokes = inverse_with_smallest_extension(GEOMETRY, targets).strokes
+    strokes = inverse_with_smallest_extension(GEOMETRY, targets).values
     magnitudes = Magnitudes(**still.campaign.deviations.model_dump())
     twin = draw_twin(NOMINAL, magnitudes, still.adaptation.seed + 2)
     tips = as_built_tips(twin, strokes, table["payload"].to_numpy()[:4])
@@ -113,7 +113,7 @@ def test_the_budget_has_every_deviation_alone_and_larger():
 def test_the_budget_counts_errors_from_targets_and_from_the_reference():
     query, _ = every(POINTS, [0.0, 172.0])
     targets, payload = query[:, :2], query[:, 2]
-    strokes = inverse_with_smallest_extension(GEOMETRY, targets).strokes
+    strokes = inverse_with_smallest_extension(GEOMETRY, targets).values
     exact = MEASURED.campaign.model_copy(update={"noise": 0.0})
     both = {"none": strokes, "combined": strokes}
     item = budget.Item(4, {("none", 1.0): NO_ERRORS}, both)
@@ -190,7 +190,7 @@ def test_wrong_values_of_the_section_are_told(change, message):
 def campaign(payloads=(0.0, 172.0), exact=False):
     """Reached points 10 mm off without compensation, 2 mm with it, but for the second point."""
     rows = []
-    strokes = inverse_with_smallest_extension(GEOMETRY, POINTS).strokes
+    strokes = inverse_with_smallest_extension(GEOMETRY, POINTS).values
     for method, error in (("none", 0.010), ("combined", 0.002)):
         for number, (point, row) in enumerate(zip(POINTS, strokes, strict=True)):
             for payload in payloads:
@@ -318,7 +318,7 @@ def test_the_jib_cylinder_pushes_where_the_flexible_crane_says_so(results):
 
 def test_points_are_told_by_angle_force_and_share(results):
     table = point_table(results)
-    poses = pose(GEOMETRY, inverse_with_smallest_extension(GEOMETRY, POINTS).strokes)
+    poses = pose(GEOMETRY, inverse_with_smallest_extension(GEOMETRY, POINTS).values)
     lean = np.degrees(poses.jib_angle) + 90.0
     np.testing.assert_allclose(table["jib from vertical (deg)"], lean)
     assert (lean < 0).tolist() == [True, True, False]

@@ -156,12 +156,12 @@ def test_round_trip_over_random_strokes(geometry):
     found = pose(geometry, strokes)
     solution = inverse(geometry, found.tip, strokes[:, 2])
     assert solution.reached.all()
-    assert np.abs(forward(geometry, solution.strokes) - found.tip).max() < 1e-9
-    assert np.array_equal(solution.strokes[:, 2], strokes[:, 2])
+    assert np.abs(forward(geometry, solution.values) - found.tip).max() < 1e-9
+    assert np.array_equal(solution.values[:, 2], strokes[:, 2])
     # between the folds there is one answer, and it is well determined away from them
     inside = fold(found) < -0.05
     assert 0.8 < inside.mean() < 1
-    assert np.abs(solution.strokes - strokes)[inside].max() < 1e-6
+    assert np.abs(solution.values - strokes)[inside].max() < 1e-6
 
 
 def test_corners_of_the_strokes_are_reached(geometry):
@@ -169,10 +169,10 @@ def test_corners_of_the_strokes_are_reached(geometry):
     tip = forward(geometry, corners)
     solution = inverse(geometry, tip, corners[:, 2])
     assert solution.reached.all()
-    assert forward(geometry, solution.strokes) == pytest.approx(tip, abs=1e-9)
+    assert forward(geometry, solution.values) == pytest.approx(tip, abs=1e-9)
     # limits are kept to the last digit
-    assert (solution.strokes >= 0).all()
-    assert (solution.strokes <= geometry.stroke_maximum).all()
+    assert (solution.values >= 0).all()
+    assert (solution.values <= geometry.stroke_maximum).all()
     corner = forward(geometry, [[0.535, 0.0, 1.6]])
     # the arm is stretched past its fold there, so a shorter extension may do as well
     assert inverse_with_smallest_extension(geometry, corner).reached.all()
@@ -188,9 +188,9 @@ def test_jib_strokes_beyond_the_folds_are_found_where_the_first_branch_has_none(
     assert beyond[: n // 2].any() and beyond[n // 2 :].any()
     solution = inverse(geometry, found.tip, strokes[:, 2])
     assert solution.reached.all()
-    assert np.abs(forward(geometry, solution.strokes) - found.tip).max() < 1e-9
+    assert np.abs(forward(geometry, solution.values) - found.tip).max() < 1e-9
     # the other branch is taken only where the first is not within the cylinders
-    chosen = fold(pose(geometry, solution.strokes)) > 1e-6
+    chosen = fold(pose(geometry, solution.values)) > 1e-6
     assert chosen.any()
     assert not chosen[~beyond].any()
 
@@ -210,11 +210,11 @@ def test_nan_stands_for_out_of_reach_and_for_nothing_else(geometry):
     targets, extension = rng.uniform(-9, 9, (5000, 2)), rng.uniform(0, 1.6, 5000)
     solution = inverse(geometry, targets, extension)
     assert set(solution.status) == {REACHED, OUT_OF_REACH, ACTUATOR_LIMIT}
-    nan = np.isnan(solution.strokes)
+    nan = np.isnan(solution.values)
     assert np.array_equal(nan.all(axis=1), solution.status == OUT_OF_REACH)
     assert np.array_equal(nan.any(axis=1), nan.all(axis=1))
     limit = np.array(geometry.stroke_maximum)
-    within = ((solution.strokes >= 0) & (solution.strokes <= limit)).all(axis=1)
+    within = ((solution.values >= 0) & (solution.values <= limit)).all(axis=1)
     assert np.array_equal(within, solution.reached)
     # the radius alone tells what no stroke of lift and jib could reach
     radius = np.linalg.norm(targets - LIFT_PIVOT, axis=1)
@@ -223,8 +223,8 @@ def test_nan_stands_for_out_of_reach_and_for_nothing_else(geometry):
     assert (solution.status[far] == OUT_OF_REACH).all()
     # needed strokes put the tip there where the linkage can follow
     needed = solution.status == ACTUATOR_LIMIT
-    tip = forward(geometry, solution.strokes[needed])
-    follows = np.isfinite(tip).all(axis=1) & (solution.strokes[needed] > -0.3).all(axis=1)
+    tip = forward(geometry, solution.values[needed])
+    follows = np.isfinite(tip).all(axis=1) & (solution.values[needed] > -0.3).all(axis=1)
     assert np.abs(tip - targets[needed])[follows].max() < 1e-6
 
 
@@ -258,7 +258,7 @@ def test_no_extension_where_the_scan_finds_none(geometry):
     assert np.array_equal(np.isfinite(smallest), reachable)
     solution = inverse_with_smallest_extension(geometry, targets)
     assert np.array_equal(solution.reached, reachable)
-    assert np.abs(forward(geometry, solution.strokes[reachable]) - targets[reachable]).max() < 1e-9
+    assert np.abs(forward(geometry, solution.values[reachable]) - targets[reachable]).max() < 1e-9
 
 
 def test_retracted_crane_needs_no_extension(geometry):
@@ -298,7 +298,7 @@ def test_smallest_extension_respects_its_lower_bound(geometry):
     assert np.array_equal(found == at_least, inverse(geometry, targets, at_least).reached)
     solution = inverse_with_smallest_extension(geometry, targets, at_least)
     assert solution.reached.all()
-    assert np.array_equal(solution.strokes[:, 2], found)
+    assert np.array_equal(solution.values[:, 2], found)
     # one bound for all; above the longest stroke nothing is left
     assert (smallest_extension(geometry, targets[strokes[:, 2] > 0.5], 0.5) >= 0.5).all()
     assert np.isnan(smallest_extension(geometry, targets, 1.7)).all()
@@ -318,7 +318,7 @@ def test_jacobians_of_forward_and_inverse_are_each_others_inverse(geometry):
     back = np.stack(
         [
             derivative(
-                lambda x: inverse(geometry, x, extension).strokes[:, :2],
+                lambda x: inverse(geometry, x, extension).values[:, :2],
                 forward(geometry, strokes),
                 column,
             )

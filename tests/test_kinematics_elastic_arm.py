@@ -90,15 +90,15 @@ def test_inverse_of_forward_on_both_elbows(theta_1, theta_2):
     for side in (1.0, -1.0):
         found = inverse(FREE, tip, side)
         assert found.status.tolist() == [REACHED]
-        assert FREE.forward(found.angles) == pytest.approx(tip, abs=1e-7)
-    own = inverse(FREE, tip, elbow(angles)).angles
+        assert FREE.forward(found.values) == pytest.approx(tip, abs=1e-7)
+    own = inverse(FREE, tip, elbow(angles)).values
     # the root of a stretched arm costs half the digits
     assert np.angle(np.exp(1j * (own - angles))) == pytest.approx(np.zeros((1, 2)), abs=1e-6)
 
 
 def test_elbows_mirror_each_other():
     tip = ARM.forward(np.radians([[5.0, 20.0]]))
-    up, down = inverse(FREE, tip, 1.0).angles[0], inverse(FREE, tip, -1.0).angles[0]
+    up, down = inverse(FREE, tip, 1.0).values[0], inverse(FREE, tip, -1.0).values[0]
     assert up[1] == pytest.approx(-down[1])
     assert np.degrees(up) == pytest.approx([5.0, 20.0])
     # the line to the tip halves the angle between the two first links
@@ -110,8 +110,8 @@ def test_rule_takes_the_elbow_farther_inside_the_limits():
     angles = np.radians([[5.0, 20.0], [20.0, -20.0], [0.0, -35.0], [15.0, -40.0], [30.0, 0.0]])
     found = inverse_by_rule(ARM, ARM.forward(angles))
     assert found.reached.all()
-    assert ARM.forward(found.angles) == pytest.approx(ARM.forward(angles), abs=1e-12)
-    assert elbow(found.angles).tolist() == [1.0, -1.0, -1.0, -1.0, 1.0]
+    assert ARM.forward(found.values) == pytest.approx(ARM.forward(angles), abs=1e-12)
+    assert elbow(found.values).tolist() == [1.0, -1.0, -1.0, -1.0, 1.0]
 
 
 @given(st.floats(-0.8, 0.8), st.floats(0.5, 1.19))
@@ -120,22 +120,22 @@ def test_rule_reaches_what_either_elbow_reaches(direction, reach):
     either = [inverse(ARM, target, side) for side in (1.0, -1.0)]
     found = inverse_by_rule(ARM, target)
     assert found.reached[0] == any(solution.reached[0] for solution in either)
-    assert any(np.array_equal(found.angles, s.angles) for s in either)
+    assert any(np.array_equal(found.values, s.values) for s in either)
 
 
 def test_status_and_angles_of_targets_beyond_reach_and_limits():
     targets = np.array([[1.2, 0.0], [0.01, 0.0], [-1.0, 0.1], [1.1, 0.3]])
     found = inverse_by_rule(ARM, targets)
     assert found.status.tolist() == [OUT_OF_REACH, OUT_OF_REACH, ACTUATOR_LIMIT, REACHED]
-    assert np.isnan(found.angles).all(axis=1).tolist() == [True, True, False, False]
-    assert ARM.forward(found.angles[2:]) == pytest.approx(targets[2:], abs=1e-12)
+    assert np.isnan(found.values).all(axis=1).tolist() == [True, True, False, False]
+    assert ARM.forward(found.values[2:]) == pytest.approx(targets[2:], abs=1e-12)
 
 
 def test_limits_admit_the_poses_on_them():
     corners = np.array([[a, b] for a in ARM.limits[0] for b in ARM.limits[1]])
     found = inverse(ARM, ARM.forward(corners), elbow(corners))
     assert found.reached.all()
-    assert found.angles == pytest.approx(corners, abs=1e-9)
+    assert found.values == pytest.approx(corners, abs=1e-9)
 
 
 def test_the_inverse_of_a_manipulator_keeps_what_it_does_not_reach():
@@ -149,7 +149,7 @@ def test_the_inverse_of_a_manipulator_keeps_what_it_does_not_reach():
 def test_a_correction_does_not_turn_the_elbow_over():
     """Along a line across the border between the elbows, by the rule of the original target."""
     line = np.column_stack([np.full(400, 1.12), np.linspace(0.1, 0.35, 400)])
-    side = ARM.branch(inverse_by_rule(ARM, line).angles)[:, 0]
+    side = ARM.branch(inverse_by_rule(ARM, line).values)[:, 0]
     border = int(np.flatnonzero(np.diff(side))[0])
     original, corrected = line[[border]], line[[border + 1]]
     alone = ARM.inverse(corrected, np.zeros((1, 2)))

@@ -49,7 +49,7 @@ def test_largest_published_error_is_that_of_a_point_beside_ours(published):
     """
     model = crane_case.crane(CALIBRATED)
     target = np.array([[6.0, 2.0]])
-    strokes = inverse_with_smallest_extension(model.geometry, target).strokes
+    strokes = inverse_with_smallest_extension(model.geometry, target).values
     x, y = 1e3 * np.abs(target - tips(model, strokes, np.array([470.0])))[0]
     largest, vertical = published.loc[["max_error", "max_abs_dy"], "none"]
     assert np.hypot(x, y) == pytest.approx(largest, rel=0.01)

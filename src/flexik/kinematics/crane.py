@@ -11,14 +11,11 @@ flexible model puts its pins at the same points. The tips differ from the code's
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexik.errors import ParameterError
-from flexik.kinematics.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
+from flexik.kinematics.manipulator import Array, RigidSolution, arc_cosine, limited
 from flexik.machines.crane import CraneGeometry
 from flexik.parameters.model import Vector
-
-Array = NDArray[np.float64]
 
 # A stroke this far outside its limits is round-off of a target on the border, m
 STROKE_TOLERANCE = 1e-10
@@ -39,22 +36,6 @@ class CranePose(NamedTuple):
     tip: Array
     lift_angle: Array
     jib_angle: Array
-
-
-class InverseSolution(NamedTuple):
-    """Strokes (n, 3) in m and a status (n,) of STATUS_MEANING.
-
-    Rows with OUT_OF_REACH hold NaN strokes; rows with ACTUATOR_LIMIT hold the strokes that would be
-    needed.
-    """
-
-    strokes: Array
-    status: NDArray[np.int64]
-
-    @property
-    def reached(self) -> NDArray[np.bool_]:
-        """Rows whose strokes lie within the cylinders, (n,)."""
-        return self.status == REACHED
 
 
 def pose(geometry: CraneGeometry, strokes: Array) -> CranePose:
@@ -112,7 +93,7 @@ def forward(geometry: CraneGeometry, strokes: Array) -> Array:
     return pose(geometry, strokes).tip
 
 
-def inverse(geometry: CraneGeometry, targets: Array, extension: Array | float) -> InverseSolution:
+def inverse(geometry: CraneGeometry, targets: Array, extension: Array | float) -> RigidSolution:
     """Lift and jib strokes that put the rigid tip on `targets` (n, 2), at `extension` (n,), in m.
 
     The distance from lift pivot to tip is greatest near a jib stroke of 0.02 m (arm stretched) and
@@ -123,11 +104,7 @@ def inverse(geometry: CraneGeometry, targets: Array, extension: Array | float) -
     targets = np.atleast_2d(np.asarray(targets, dtype=float))
     extension = np.broadcast_to(np.asarray(extension, dtype=float), targets.shape[:1])
     inside, outside = (_inverse_branch(geometry, targets, extension, s) for s in (-1.0, 1.0))
-    use_outside = ~inside.reached & outside.reached
-    return InverseSolution(
-        np.where(use_outside[:, None], outside.strokes, inside.strokes),
-        np.where(use_outside, outside.status, inside.status),
-    )
+    return inside.but(~inside.reached & outside.reached, outside)
 
 
 def smallest_extension(
@@ -162,7 +139,7 @@ def smallest_extension(
 
 def inverse_with_smallest_extension(
     geometry: CraneGeometry, targets: Array, at_least: Array | float = 0.0
-) -> InverseSolution:
+) -> RigidSolution:
     """Strokes (n, 3) for `targets` (n, 2) with the smallest extension >= `at_least`, in m."""
     extension = smallest_extension(geometry, targets, at_least)
     return inverse(geometry, targets, np.where(np.isnan(extension), at_least, extension))
@@ -203,15 +180,15 @@ def _wrap(angle: Array) -> Array:
     return np.angle(np.exp(1j * angle))
 
 
-def _acos(cosine: Array) -> Array:
-    """Arc cosine; NaN outside [-1, 1] but for round-off."""
-    slack = np.where(np.abs(cosine) <= 1.0 + 1e-12, np.clip(cosine, -1.0, 1.0), np.nan)
-    return np.arccos(slack)
-
-
 def _opposite_angle(a: float | Array, b: float | Array, c: float | Array) -> Array:
     """Angle between sides `a` and `b` of a triangle whose third side is `c`."""
-    return _acos(np.asarray((a**2 + b**2 - c**2) / (2 * a * b)))
+    return arc_cosine(np.asarray((a**2 + b**2 - c**2) / (2 * a * b)))
+
+
+def _opposite_side(a: float, b: float, angle: Array) -> Array:
+    """Third side (n,); negative where the angle is: beyond half a turn there is no assembly."""
+    side = np.sqrt(a**2 + b**2 - 2 * a * b * np.cos(angle))
+    return np.where(angle >= 0, side, -side)
 
 
 def _tip_in_jib(geometry: CraneGeometry, extension: Array) -> Array:
@@ -228,11 +205,9 @@ def _lift_angle(geometry: CraneGeometry, stroke: Array) -> Array:
 
 def _lift_stroke(geometry: CraneGeometry, lift_angle: Array) -> Array:
     base, head = geometry.lift_cylinder_base, geometry.lift_cylinder_head
-    # opening beyond half a turn either way is no assembly of this triangle
     opening = _wrap(lift_angle + _arg(head) - _arg(base))
-    a, b = np.hypot(*base), np.hypot(*head)
-    length = np.sqrt(a**2 + b**2 - 2 * a * b * np.cos(opening))
-    return np.where(opening >= 0, length, -length) - geometry.lift_cylinder_length
+    length = _opposite_side(np.hypot(*base), np.hypot(*head), opening)
+    return length - geometry.lift_cylinder_length
 
 
 def _jib_angle(geometry: CraneGeometry, stroke: Array) -> tuple[Array, Array]:
@@ -265,9 +240,8 @@ def _jib_stroke(geometry: CraneGeometry, relative_angle: Array) -> Array:
     rocker_angle = np.arctan2(to_pin[:, 1], to_pin[:, 0]) + side
     base = geometry.jib_cylinder_base
     opening = _wrap(_arg(base) - rocker_angle)
-    a, b = np.hypot(*base), geometry.rocker_length
-    length = np.sqrt(a**2 + b**2 - 2 * a * b * np.cos(opening))
-    return np.where(opening >= 0, length, -length) - geometry.jib_cylinder_length
+    length = _opposite_side(np.hypot(*base), geometry.rocker_length, opening)
+    return length - geometry.jib_cylinder_length
 
 
 def _unit(angle: Array) -> Array:
@@ -276,14 +250,14 @@ def _unit(angle: Array) -> Array:
 
 def _inverse_branch(
     geometry: CraneGeometry, targets: Array, extension: Array, sign: float
-) -> InverseSolution:
+) -> RigidSolution:
     pivot, jib_pivot = np.array(geometry.lift_pivot), geometry.jib_pivot
     from_pivot = targets - pivot
     tip = _tip_in_jib(geometry, extension)
     arm, outer = float(np.hypot(*jib_pivot)), np.hypot(tip[:, 0], tip[:, 1])
     reach = np.hypot(from_pivot[:, 0], from_pivot[:, 1])
     with np.errstate(invalid="ignore"):
-        bend = _acos((reach**2 - arm**2 - outer**2) / (2 * arm * outer))
+        bend = arc_cosine((reach**2 - arm**2 - outer**2) / (2 * arm * outer))
     tip_direction = np.arctan2(tip[:, 1], tip[:, 0])
     relative_angle = _wrap(_arg(jib_pivot) - tip_direction + sign * bend)
     tip_in_lift = np.array(jib_pivot) + rotate(relative_angle, tip)
@@ -293,15 +267,7 @@ def _inverse_branch(
     strokes = np.column_stack(
         [_lift_stroke(geometry, lift_angle), _jib_stroke(geometry, relative_angle), extension]
     )
-    maximum = np.array(geometry.stroke_maximum)
-    unsolved = np.isnan(strokes).any(axis=1)
-    strokes[unsolved] = np.nan
-    with np.errstate(invalid="ignore"):
-        allowed = (strokes >= -STROKE_TOLERANCE) & (strokes <= maximum + STROKE_TOLERANCE)
-    inside = np.all(allowed, axis=1)
-    strokes = np.where(inside[:, None], np.clip(strokes, 0.0, maximum), strokes)
-    status = np.where(unsolved, OUT_OF_REACH, np.where(inside, REACHED, ACTUATOR_LIMIT))
-    return InverseSolution(strokes, status)
+    return limited(strokes, np.zeros(3), np.array(geometry.stroke_maximum), STROKE_TOLERANCE)
 
 
 def _extension_borders(geometry: CraneGeometry, targets: Array) -> list[Array]:

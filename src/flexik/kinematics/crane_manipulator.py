@@ -55,9 +55,7 @@ class CraneManipulator:
         extension = np.where(np.isnan(extension), smallest_extension(geometry, targets), extension)
         # where nothing reaches, any extension tells why
         extension = np.where(np.isnan(extension), needed, extension)
-        solution = inverse(geometry, targets, extension)
-        strokes = np.where(solution.reached[:, None], solution.strokes, current)
-        return RigidSolution(strokes, solution.status, {})
+        return inverse(geometry, targets, extension).or_current(current)
 
     def branch(self, values: Array) -> Array:
         """Extension strokes (n, 1)."""
@@ -78,4 +76,4 @@ class CraneManipulator:
             raise UnreachableError(f"the rigid crane does not reach {missed} (x, y in m)")
         # whole steps inside the limits; the slack is for limits that are whole steps themselves
         most = np.floor(self.upper / STEP + 1e-6)
-        return np.round(np.minimum(np.round(solution.strokes / STEP), most) * STEP, 2)
+        return np.round(np.minimum(np.round(solution.values / STEP), most) * STEP, 2)

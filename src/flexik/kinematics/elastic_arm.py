@@ -10,16 +10,11 @@ link away from its rigid place, dphi turns it (equation 18).
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flexik.kinematics.manipulator import RigidSolution
-from flexik.kinematics.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
-
-Array = NDArray[np.float64]
-Interval = tuple[float, float]
+from flexik.kinematics.manipulator import Array, RigidSolution, arc_cosine, limited
+from flexik.parameters.model import Interval
 
 DEFORMATION = ("dy_1", "dx_1", "dphi_1", "dy_2", "dx_2", "dphi_2")
 
@@ -61,32 +56,16 @@ class ArmGeometry:
         is not reached with this elbow, the rule is asked again, which reaches what either elbow
         reaches. The rule leaves nothing to choose: the current angles serve unreached rows only.
         """
-        angles, status = inverse_by_rule(self, targets)
+        solution = inverse_by_rule(self, targets)
         if original_targets is not None:
-            original = np.nan_to_num(inverse_by_rule(self, original_targets).angles)
+            original = np.nan_to_num(inverse_by_rule(self, original_targets).values)
             same = inverse(self, targets, elbow(original))
-            angles = np.where(same.reached[:, None], same.angles, angles)
-        reached = (status == REACHED)[:, None]
-        return RigidSolution(np.where(reached, angles, current), status, {})
+            solution = solution.but(same.reached, same)
+        return solution.or_current(current)
 
     def branch(self, values: Array) -> Array:
         """Side of the elbow (n, 1) at angles (n, 2)."""
         return elbow(values)[:, None]
-
-
-class InverseSolution(NamedTuple):
-    """Joint angles (n, 2) in rad and a status (n,), see kinematics.status.
-
-    Rows with OUT_OF_REACH hold NaN; rows with ACTUATOR_LIMIT the angles that would be needed.
-    """
-
-    angles: Array
-    status: NDArray[np.int64]
-
-    @property
-    def reached(self) -> NDArray[np.bool_]:
-        """Rows whose angles lie within the limits, (n,)."""
-        return self.status == REACHED
 
 
 def flexible_forward(geometry: ArmGeometry, angles: Array, deformation: Array) -> Array:
@@ -108,31 +87,22 @@ def elbow(angles: Array) -> Array:
     return np.where(np.atleast_2d(angles)[:, 1] >= 0.0, 1.0, -1.0)
 
 
-def inverse(geometry: ArmGeometry, targets: Array, elbow: Array | float) -> InverseSolution:
+def inverse(geometry: ArmGeometry, targets: Array, elbow: Array | float) -> RigidSolution:
     """Angles that put the rigid tip on `targets` (n, 2) in m with `elbow` (n,), 1 or -1."""
     targets = np.atleast_2d(np.asarray(targets, dtype=float))
     x, y = targets.T
     a_1, a_2 = geometry.lengths
     cosine = (x**2 + y**2 - a_1**2 - a_2**2) / (2 * a_1 * a_2)
-    theta_2 = elbow * _arccos(cosine)
+    theta_2 = elbow * arc_cosine(cosine)
     theta_1 = np.arctan2(y, x) - np.arctan2(a_2 * np.sin(theta_2), a_1 + a_2 * np.cos(theta_2))
     # the turn that lies within the limits, if one does
     low = geometry.limits[0][0] - ANGLE_TOLERANCE
     theta_1 = low + np.mod(theta_1 - low, 2 * np.pi)
     angles = np.column_stack([theta_1, theta_2])
-    with np.errstate(invalid="ignore"):
-        allowed = (angles >= geometry.lower - ANGLE_TOLERANCE) & (
-            angles <= geometry.upper + ANGLE_TOLERANCE
-        )
-    inside: NDArray[np.bool_] = np.all(allowed, axis=1)
-    angles = np.where(inside[:, None], np.clip(angles, geometry.lower, geometry.upper), angles)
-    unreached = np.isnan(theta_2)
-    angles = np.where(unreached[:, None], np.nan, angles)
-    status = np.where(unreached, OUT_OF_REACH, np.where(inside, REACHED, ACTUATOR_LIMIT))
-    return InverseSolution(angles, status)
+    return limited(angles, geometry.lower, geometry.upper, ANGLE_TOLERANCE)
 
 
-def inverse_by_rule(geometry: ArmGeometry, targets: Array) -> InverseSolution:
+def inverse_by_rule(geometry: ArmGeometry, targets: Array) -> RigidSolution:
     """Angles for `targets` (n, 2) in m on the elbow that a rule chooses.
 
     The rule takes the elbow whose angles lie farther inside their limits, relative to half the
@@ -142,19 +112,9 @@ def inverse_by_rule(geometry: ArmGeometry, targets: Array) -> InverseSolution:
     middle, half = (geometry.lower + geometry.upper) / 2, (geometry.upper - geometry.lower) / 2
     with np.errstate(invalid="ignore"):
         first_off, second_off = (
-            np.max(np.abs(solution.angles - middle) / half, axis=1) for solution in (first, second)
+            np.max(np.abs(solution.values - middle) / half, axis=1) for solution in (first, second)
         )
-        use_second = second_off < first_off
-    return InverseSolution(
-        np.where(use_second[:, None], second.angles, first.angles),
-        np.where(use_second, second.status, first.status),
-    )
-
-
-def _arccos(cosine: Array) -> Array:
-    """Arc cosine (n,), NaN outside [-1, 1] but for round-off of a stretched or folded arm."""
-    within = np.abs(cosine) <= 1.0 + 1e-12
-    return np.arccos(np.where(within, np.clip(cosine, -1.0, 1.0), np.nan))
+        return first.but(second_off < first_off, second)
 
 
 def _turned(angle: Array, along: Array, across: Array) -> Array:

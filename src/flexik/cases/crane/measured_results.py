@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
-from flexik.cases.crane.parts.crane import DATA, SPRING, flexible
+from flexik.cases.crane.parts.crane import flexible
 from flexik.cases.crane.parts.measured.errors import campaign_errors
 from flexik.cases.crane.parts.measured.fields import METHODS, TARGET
 from flexik.cases.crane.report_results import REFERENCE
@@ -29,12 +29,9 @@ ERRORS = {"measured_errors": "", "measured_reference_errors": "reference_"}
 
 @dataclass(frozen=True)
 class Measured:
-    """Campaign, what is identified from it, and studies on cranes as built; SI units.
+    """The nominal crane, tables of parts.measured, and published statistics (mm) by name of ERRORS.
 
-    crane : the nominal one.
-    campaign, budget, restarts, adaptation, offsets, predictions, commands : tables of
-        parts.measured.
-    published : statistics (mm) by name of ERRORS.
+    SI units.
     """
 
     section: Section
@@ -62,15 +59,11 @@ class Measured:
     @cached_property
     def budget_means(self) -> pd.DataFrame:
         """Mean errors of each crane, m: deviation, factor, twin; by method, from either origin."""
-        rows = self.budget.set_index(["deviation", "factor", "twin"])
-        found = {
-            f"{method}{end}": rows.loc[rows["method"] == method, column]
-            .groupby(level=[0, 1, 2], sort=False)
-            .mean()
-            for column, end in (("error", ""), ("reference_error", "_reference"))
-            for method in METHODS
-        }
-        return pd.DataFrame(found).reset_index()
+        keys, ends = ["deviation", "factor", "twin"], {"error": "", "reference_error": "_reference"}
+        groups = self.budget.groupby([*keys, "method"], sort=False)[list(ends)]
+        found = groups.mean().unstack("method", sort=False)  # type: ignore[arg-type]
+        found.columns = [f"{method}{ends[error]}" for error, method in found.columns]
+        return found.reset_index()
 
     @cached_property
     def adapted(self) -> pd.DataFrame:
@@ -86,22 +79,20 @@ class Measured:
 
 def read(section: Section) -> Measured:
     """Results of the parts beside the published values."""
-    found = {
-        name: read_table(DATA / f"studies/measured/{file}.parquet")
-        for name, file in {
-            **{name: name for name in ("campaign", "budget", "adaptation")},
-            "restarts": "budget.restarts",
-            "offsets": "identified",
-            **{name: f"identified.{name}" for name in ("predictions", "commands")},
-        }.items()
-    }
-    columns = [f"{m}_{p:g}_kg" for m in METHODS for p in PUBLISHED_PAYLOADS]
-    columns += [f"{m}_all" for m in METHODS]
-    published = {
-        name: read_csv(REFERENCE / f"{name}.csv", columns, ("statistic",)).set_index("statistic")
-        for name in ERRORS
-    }
-    return Measured(section, flexible(section.machine, SPRING), **found, published=published)
+    files = {name: name for name in ("campaign", "budget", "adaptation")}
+    files |= {"restarts": "budget.restarts", "offsets": "identified"}
+    files |= {name: f"identified.{name}" for name in ("predictions", "commands")}
+    folder = section.data / "studies/measured"
+    crane = flexible(section.machine, section.data / "constants/spring.json")
+    return Measured(
+        section,
+        crane,
+        **{name: read_table(folder / f"{file}.parquet") for name, file in files.items()},
+        published={
+            name: read_csv(REFERENCE / f"{name}.csv", (), ("statistic",)).set_index("statistic")
+            for name in ERRORS
+        },
+    )
 
 
 def jib_pushes(results: Measured) -> tuple[np.ndarray, np.ndarray]:
@@ -109,7 +100,7 @@ def jib_pushes(results: Measured) -> tuple[np.ndarray, np.ndarray]:
 
     (k,), with one of the payloads or more, by statics of the rigid nominal crane.
     """
-    strokes = inverse_with_smallest_extension(results.crane.geometry, results.targets).strokes
+    strokes = inverse_with_smallest_extension(results.crane.geometry, results.targets).values
     payloads = results.campaign["payload"].unique()
     forces = [jib_force(results.crane, strokes, payload) for payload in payloads]
     return strokes, np.any(np.array(forces) < 0.0, axis=0)

@@ -81,23 +81,20 @@ def point_table(results: Measured) -> pd.DataFrame:
     """
     crane, budget = results.crane, results.budget
     points = budget[TARGET].drop_duplicates().to_numpy()
-    strokes = inverse_with_smallest_extension(crane.geometry, points).strokes
+    strokes = inverse_with_smallest_extension(crane.geometry, points).values
     angle = np.degrees(pose(crane.geometry, strokes).jib_angle) + 90.0
     found = pd.DataFrame({"point": np.arange(1, len(points) + 1), "x (m)": points[:, 0]})
     found = found.assign(**{"y (m)": points[:, 1], "jib from vertical (deg)": angle})
     for payload in sorted(budget["payload"].unique()):
         found[f"jib force, {payload:g} kg (kN)"] = 1e-3 * jib_force(crane, strokes, payload)
-    means = _point_means(budget, "all")
+    means = _point_means(budget, "all").groupby(level=TARGET, sort=False).mean()
     for method, label in COMPENSATION.items():
-        found[f"R {label} (mm)"] = (
-            MM * means["error", method].groupby(level=TARGET, sort=False).mean().to_numpy()
-        )
-    moved = means["reference_error", "combined"].groupby(level=TARGET, sort=False).mean()
-    found[MOVED] = MM * moved.to_numpy()
+        found[f"R {label} (mm)"] = MM * means["error", method].to_numpy()
+    found[MOVED] = MM * means["reference_error", "combined"].to_numpy()
     for ending, deviation in (("", "all"), (PERFECT, "none")):
-        found[[f"worse with{ending} (%)", f"worse with, from reference{ending} (%)"]] = (
-            worse_shares(budget, deviation).to_numpy()
-        )
+        shares = worse_shares(budget, deviation)
+        found[f"worse with{ending} (%)"] = shares["error"].to_numpy()
+        found[f"worse with, from reference{ending} (%)"] = shares["reference_error"].to_numpy()
     return found
 
 
@@ -106,26 +103,20 @@ def worse_shares(budget: pd.DataFrame, deviation: str) -> pd.DataFrame:
 
     Columns error and reference_error, a row a target.
     """
-    means, found = _point_means(budget, deviation), {}
-    for error in ("error", "reference_error"):
-        worse = means[error, "combined"] > means[error, "none"]
-        found[error] = 100 * worse.groupby(level=TARGET, sort=False).mean()
-    return pd.DataFrame(found)
+    means = _point_means(budget, deviation).swaplevel(axis=1)
+    worse = means["combined"] > means["none"]
+    return 100 * worse.groupby(level=TARGET, sort=False).mean()
 
 
-def _point_means(budget: pd.DataFrame, deviation: str) -> dict[tuple[str, str], pd.Series]:
-    """Mean errors over the payloads, by target and crane; by error and method.
+def _point_means(budget: pd.DataFrame, deviation: str) -> pd.DataFrame:
+    """Mean errors over the payloads, by target and crane; columns by error and method.
 
     From the points of reference over the payloads but the lightest, which is the reference itself.
     """
     rows = budget[budget["deviation"] == deviation]
-    loaded = rows[rows["payload"] > rows["payload"].min()]
-    keys = [*TARGET, "twin"]
-    return {
-        (error, method): part[part["method"] == method].groupby(keys, sort=False)[error].mean()
-        for error, part in (("error", rows), ("reference_error", loaded))
-        for method in METHODS
-    }
+    loaded = rows["reference_error"].where(rows["payload"] > rows["payload"].min())
+    groups = rows.assign(reference_error=loaded).groupby([*TARGET, "twin", "method"], sort=False)
+    return groups[["error", "reference_error"]].mean().unstack("method", sort=False)  # type: ignore[return-value]
 
 
 def _points_table(results: Measured) -> Table:

@@ -139,7 +139,7 @@ def on_branch(table: pd.DataFrame, geometry: CraneGeometry) -> NDArray[np.bool_]
     """Whether the rigid inverse takes the pose of each row (n,) for its rigid tip and extension."""
     strokes = table[list(STROKES)].to_numpy()
     taken = inverse(geometry, table[["rigid_x", "rigid_y"]].to_numpy(), strokes[:, 2])
-    return taken.reached & (np.abs(taken.strokes - strokes).max(axis=1) < _SAME_STROKES)
+    return taken.reached & (np.abs(taken.values - strokes).max(axis=1) < _SAME_STROKES)
 
 
 def learnt_rows(table: pd.DataFrame, kind: str, geometry: CraneGeometry) -> pd.DataFrame:
