@@ -56,13 +56,14 @@ def prepare(
     sections: dict[str, Path],
 ) -> Work:
     """The training grid, in pieces of equal extension, or the random set."""
+    crane = flexible(machine, spring)
     pieces: Sequence[Samples]
     if isinstance(drawn, Grid):
         pieces = GridParts(**{n: axis(**dict(getattr(drawn, n))) for n in GridParts.AXES})
     else:
         given = drawn.n_samples, drawn.payload, minimum_tip_x, drawn.seed
-        pieces = split(random_samples(geometry_of(machine), *given))
-    function = functools.partial(solve_samples, flexible(machine, spring), minimum_tip_x)
+        pieces = split(random_samples(crane.geometry, *given))
+    function = functools.partial(solve_samples, crane, minimum_tip_x)
     return Work(function, pieces, functools.partial(_finish, name, maximum_failed_share))
 
 
