@@ -60,77 +60,56 @@ def goals(results: Measured) -> dict[int, float]:
 def metrics(results: Measured) -> dict[str, float]:
     """Mean errors of the campaign, and over all cranes, in mm."""
     found: dict[str, float] = {}
-    whole = results.budget_means[results.budget_means["deviation"] == "all"]
+    whole = results.budget_means.query("deviation == 'all'")
     for prefix, end in (("", ""), ("reference.", "_reference")):
         for method in METHODS:
             if (errors := results.errors) is not None:
                 column = f"{end[1:]}_error".lstrip("_")
                 mean = errors.loc[errors["method"] == method, column].mean()
-                found[f"measured.{prefix}{method}.mean_error_mm"] = mean
-            mean = whole[f"{method}{end}"].mean()
-            found[f"measured.cranes.{prefix}{method}.mean_error_mm"] = mean
+                found[f"{prefix}{method}.mean_error"] = mean
+            found[f"cranes.{prefix}{method}.mean_error"] = whole[f"{method}{end}"].mean()
     groups = results.adapted.groupby(["method", "n_measurements"])[["mean_error", "p95_error"]]
     for row in groups.mean().reset_index().to_dict("records"):
         label, n = row["method"], row["n_measurements"]
-        prefix = f"measured.{label}_{n}" if n else f"measured.unadapted.{label}"
-        found |= {f"{prefix}.{name}_mm": row[name] for name in ("mean_error", "p95_error")}
+        prefix = f"{label}_{n}" if n else f"unadapted.{label}"
+        found |= {f"{prefix}.{name}": row[name] for name in ("mean_error", "p95_error")}
     for name in ("nominal", "adapted") if len(results.predictions) else ():
-        mean = results.predictions[f"{name}_error"].mean()
-        found[f"measured.prediction.{name}.mean_error_mm"] = mean
-    return {k: round(MM * float(value), 4) for k, value in found.items() if np.isfinite(value)}
+        found[f"prediction.{name}.mean_error"] = results.predictions[f"{name}_error"].mean()
+    found = {name: value for name, value in found.items() if np.isfinite(value)}
+    return {f"measured.{name}_mm": round(MM * float(value), 4) for name, value in found.items()}
 
 
 def values(results: Measured) -> dict[str, Any]:
     """What the sentences of measured.md.j2 say, as `measured`."""
-    settings = results.section.studies.measured
-    payloads = sorted(results.campaign["payload"].unique())
-    largest = results.published["measured_errors"].loc["max_error"]
     found = {
-        "settings": settings,
-        "has_targets": results.errors is not None,
+        "results": results,
+        "settings": results.section.studies.measured,
         "n_named": len(named_points(results.targets)),
-        "has_offsets": bool(len(results.offsets)),
-        "n_commands": len(results.commands),
         "n_failed": int((results.commands["status"] != REACHED).sum()),
         "least_trained_payload": results.section.samples.grid.payload.minimum,
-        "published_payloads": payloads == PUBLISHED_PAYLOADS,
-        "slip": [
-            largest["none_all"],
-            max(largest[f"none_{payload:g}_kg"] for payload in PUBLISHED_PAYLOADS),
-        ],
-        "spread": _spread(results),
+        "published_payloads": sorted(results.campaign["payload"].unique()) == PUBLISHED_PAYLOADS,
+        "titles": BUDGET_TITLES,
         "sensitivity": _sensitivity(results),
         "points": _points_said(point_table(results)),
         "restarts": _restarts_said(results.restarts),
     }
-    if found["has_offsets"]:
+    if len(results.offsets):
         found["predictions"] = _predictions_said(results.predictions, results.offsets)
     return {"measured": found}
 
 
-def _spread(results: Measured) -> list[dict[str, Any]]:
-    """Mean, least and largest mean (m) of a crane with all deviations, by origin and method."""
-    whole = results.budget_means[results.budget_means["deviation"] == "all"]
-    return [
-        {"title": title, "mean": whole[k].mean(), "least": whole[k].min(), "most": whole[k].max()}
-        for k, title in BUDGET_TITLES.items()
-    ]
-
-
 def _sensitivity(results: Measured) -> dict[str, Any]:
     """Which deviation the mean from the reference with compensation hangs on most; m."""
-    means = budget_by_kind(results)
-    given = means.loc[means["deviation"] == "all", "combined_reference"].iloc[0]
-    worst = means[means["factor"] > 1].sort_values("combined_reference").iloc[-1]
+    means, column = budget_by_kind(results), "combined_reference"
+    given = means.loc[means["deviation"] == "all", column].iloc[0]
+    worst = means[means["factor"] > 1].nlargest(1, column).iloc[0]
     return {
         "given": given,
-        "published": results.published["measured_reference_errors"].loc[
-            "mean_error", "combined_all"
-        ],
-        "matters": worst["combined_reference"] > 1.01 * given,
+        "published": results.published["measured_reference_errors"]["combined_all"]["mean_error"],
+        "matters": worst[column] > 1.01 * given,
         "name": DEVIATIONS[worst["deviation"]],
         "factor": worst["factor"],
-        "larger": worst["combined_reference"],
+        "larger": worst[column],
     }
 
 
@@ -178,13 +157,12 @@ def _restarts_said(restarts: pd.DataFrame) -> dict[str, Any] | None:
 def _predictions_said(predictions: pd.DataFrame, offsets: pd.DataFrame) -> dict[str, Any]:
     """Which measurements stand out, and how well crane and expectations fit."""
     distance = predictions["left_out_surprise"].fillna(predictions["surprise"])
-    rows = predictions.assign(distance=distance)
-    out = rows[rows["used"] == 0]
+    out = predictions.assign(distance=distance)[predictions["used"] == 0]
     away = (offsets["identified"] - offsets["expected"]).abs() / offsets["expected_deviation"]
     far = offsets.assign(away=away)[away > FAR].nlargest(LISTED, "away")
-    factor = misfit(rows.loc[rows["used"] == 1, "distance"].to_numpy())
+    factor = misfit(distance[predictions["used"] == 1].to_numpy())
     return {
-        "n": len(rows),
+        "n": len(predictions),
         "n_out": len(out),
         "out": out.nlargest(LISTED, "distance").to_dict("records"),
         "misfit": factor if factor > POOR else None,

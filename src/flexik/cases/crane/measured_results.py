@@ -9,7 +9,7 @@ import pandas as pd
 
 from flexik.cases.crane.parts.crane import flexible
 from flexik.cases.crane.parts.measured.errors import campaign_errors
-from flexik.cases.crane.parts.measured.fields import METHODS, TARGET
+from flexik.cases.crane.parts.measured.fields import TARGET
 from flexik.cases.crane.report_results import REFERENCE
 from flexik.cases.crane.section import Section
 from flexik.datasets.tables import read_csv, read_table
@@ -60,10 +60,9 @@ class Measured:
     def budget_means(self) -> pd.DataFrame:
         """Mean errors of each crane, m: deviation, factor, twin; by method, from either origin."""
         keys, ends = ["deviation", "factor", "twin"], {"error": "", "reference_error": "_reference"}
-        groups = self.budget.groupby([*keys, "method"], sort=False)[list(ends)]
-        found = groups.mean().unstack("method", sort=False)  # type: ignore[arg-type]
-        found.columns = [f"{method}{ends[error]}" for error, method in found.columns]
-        return found.reset_index()
+        found = self.budget.pivot_table(list(ends), keys, "method", sort=False)
+        names = [f"{pair[1]}{ends[pair[0]]}" for pair in found.columns.to_flat_index()]
+        return found.set_axis(names, axis=1).reset_index()
 
     @cached_property
     def adapted(self) -> pd.DataFrame:

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from flexik.cases.crane.measured_results import ERRORS, PUBLISHED_PAYLOADS, Measured, jib_force
-from flexik.cases.crane.parts.measured.fields import METHODS, TARGET
+from flexik.cases.crane.parts.measured.fields import TARGET
 from flexik.cases.crane.report_tables import STATISTIC_NAMES
 from flexik.evaluation.errors import STATISTICS
 from flexik.kinematics.crane import inverse_with_smallest_extension, pose
@@ -104,7 +104,7 @@ def worse_shares(budget: pd.DataFrame, deviation: str) -> pd.DataFrame:
     Columns error and reference_error, a row a target.
     """
     means = _point_means(budget, deviation).swaplevel(axis=1)
-    worse = means["combined"] > means["none"]
+    worse: Any = means["combined"] > means["none"]
     return 100 * worse.groupby(level=TARGET, sort=False).mean()
 
 
@@ -115,8 +115,9 @@ def _point_means(budget: pd.DataFrame, deviation: str) -> pd.DataFrame:
     """
     rows = budget[budget["deviation"] == deviation]
     loaded = rows["reference_error"].where(rows["payload"] > rows["payload"].min())
-    groups = rows.assign(reference_error=loaded).groupby([*TARGET, "twin", "method"], sort=False)
-    return groups[["error", "reference_error"]].mean().unstack("method", sort=False)  # type: ignore[return-value]
+    rows = rows.assign(reference_error=loaded)
+    keys = [*TARGET, "twin"]
+    return rows.pivot_table(["error", "reference_error"], keys, "method", sort=False)
 
 
 def _points_table(results: Measured) -> Table:

@@ -222,8 +222,8 @@ def _cylinders(geometry: CraneGeometry, pins: Points) -> list[Layer]:
     """Cylinders, rocker and coupler."""
     found, dark = [], {"color": "#3D3D3D", "solid_capstyle": "butt"}
     lengths = geometry.lift_cylinder_length, geometry.jib_cylinder_length
-    for (base, head), length in zip(("CD", "EH"), lengths, strict=True):
-        start, end = pins[base], pins[head]
+    for ends, length in zip(("CD", "EH"), lengths, strict=True):
+        start, end = (pins[letter] for letter in ends)
         barrel = start + 0.9 * length * (end - start) / np.hypot(*(end - start))
         found.append(_layer([start, end], "-", color="#A6A6A6", linewidth=4, zorder=4))
         found.append(_layer([start, barrel], "-", linewidth=8, zorder=4.1, **dark))
