@@ -83,7 +83,7 @@ def test_gauge_network_is_told_the_deformation_beside_the_target(learns, inputs)
         asked.append(values)
         return np.tile([0.1, 9.0], (4, 1))
 
-    method = GaugeNetwork(GEOMETRY, predicting(predict), KINDS[learns].input_names, DEFORMED)
+    method = GaugeNetwork(GEOMETRY, predicting(predict), KINDS[learns].inputs, DEFORMED)
     answer = method(QUERY, HOME)
     assert np.array_equal(asked[0], inputs)
     assert answer.values.tolist() == [[0.1, GEOMETRY.upper[1]]] * 4

@@ -94,7 +94,7 @@ def test_fit_and_sensitivity_are_those_of_the_held_out_readings(project, metrics
     readings = read_table(samples / "readings.parquet")
     held_out = readings[readings["part"] == "held_out"]
     paths = samples / "readings.parquet", samples / "readings.noise_free.parquet"
-    inputs, angles = learning_data("gauges", *paths).held_out
+    inputs, angles = learning_data("gauges", *paths).of("held_out")
     arm = flexible_arm(project[1].machine)
     network, record = load_network(project[0] / f"data/elastic_arm/networks/{MAIN}.json")
 
@@ -112,7 +112,7 @@ def test_fit_and_sensitivity_are_those_of_the_held_out_readings(project, metrics
     )
     table = csv(project, "sensitivity").set_index("input that is off")
     off = 1e-6 * table.loc["dx_2", "off by (um, urad)"] * (np.arange(8) == 4)
-    assert KINDS["gauges"].input_names[4] == "dx_2"
+    assert KINDS["gauges"].inputs[4] == "dx_2"
     assert table.loc["dx_2", MAIN] == pytest.approx(tip_error(inputs + off).mean(), abs=1e-3)
     assert np.isnan(table.loc["dx_1", "published_network_without_dx"])
     # of every start, the chosen one among them

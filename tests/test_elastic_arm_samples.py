@@ -1,14 +1,12 @@
 """Readings of the elastic arm, its gauges, and what networks learn from."""
 
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 import pytest
 from elastic_arm import GEOMETRY, MODEL, SECTION
 
 from flexik.cases.elastic_arm.parts import gauges
-from flexik.cases.elastic_arm.parts.gauges import gauges_of, noise_generator
+from flexik.cases.elastic_arm.parts.gauges import noise_generator
 from flexik.cases.elastic_arm.parts.generate import parts
 from flexik.cases.elastic_arm.parts.kinds import KINDS, learning_data, learning_table
 from flexik.cases.elastic_arm.parts.readings import (
@@ -26,7 +24,8 @@ from flexik.datasets.tables import read_table
 from flexik.kinematics.elastic_arm import DEFORMATION, elbow, flexible_forward
 from flexik.multibody.elastic_arm import Equilibria, equilibria
 
-GAUGES = gauges_of(SECTION.machine)
+MACHINE = SECTION.machine
+GAUGES = MACHINE.gauges
 
 
 @pytest.fixture(scope="module")
@@ -36,8 +35,12 @@ def few():
     return angles, payload, equilibria(MODEL, angles, payload)
 
 
-def read(found, generator=None, settings=GAUGES):
-    return gauges.read(settings, *found[1:], generator)
+def other(**changes):
+    return MACHINE.model_copy(update={"gauges": GAUGES.model_copy(update=changes)})
+
+
+def read(found, generator=None, machine=MACHINE, **options):
+    return gauges.read(machine, *found[1:], generator, **options)
 
 
 def test_the_readings_are_the_560_of_the_paper():
@@ -66,7 +69,7 @@ def test_readings_are_divided_by_seed_into_disjoint_parts():
 def test_voltages_are_those_of_the_published_lines():
     """Equations 48 to 53 forwards, by hand."""
     deformation = np.array([[-0.005, 0.0, 0.0, 0.002, 0.0, 0.0]])
-    shown = gauges.read(GAUGES, deformation, np.array([[-0.002, 0.001]]), np.zeros((1, 2)), None)
+    shown = gauges.read(MACHINE, deformation, np.array([[-0.002, 0.001]]), np.zeros((1, 2)), None)
     expected = [
         (-0.005 - 8e-5) / 0.0026,
         (-0.005 - 3e-5) / 0.0010,
@@ -100,7 +103,7 @@ def test_noise_and_resolution_are_those_of_params(few):
     *_, found = few
     many = Equilibria(*(np.repeat(values, 2000, axis=0) for values in found))
     exact = read(many)
-    fine = replace(GAUGES, resolution=0.0, strain_resolution=0.0)
+    fine = other(resolution=0.0, strain_resolution=0.0)
     noisy = read(many, np.random.default_rng(0), fine)
     assert np.std(noisy.voltages - exact.voltages) == pytest.approx(GAUGES.noise, rel=0.02)
     assert np.std(noisy.strains - exact.strains) == pytest.approx(GAUGES.strain_noise, rel=0.02)
@@ -114,7 +117,7 @@ def test_uncertainty_of_the_deformation_is_that_of_many_noisy_readings(few):
     *_, found = few
     many = Equilibria(*(np.repeat(values, 4000, axis=0) for values in found))
     # steps that the noise spreads over
-    settings = replace(GAUGES, resolution=1e-3, strain_resolution=1e-7)
+    settings = other(resolution=1e-3, strain_resolution=1e-7)
     apart = read(many, np.random.default_rng(1), settings).deformation - read(many).deformation
     assert np.std(apart, axis=0) == pytest.approx(gauges.uncertainty(settings), rel=0.03)
     volt = np.hypot(2e-3, 1e-3 / np.sqrt(12))
@@ -126,8 +129,8 @@ def test_uncertainty_of_the_deformation_is_that_of_many_noisy_readings(few):
 def test_voltages_beyond_the_range_are_clipped_and_counted(few):
     *_, found = few
     exact = read(found).voltages
-    assert gauges.n_clipped(GAUGES, exact) == 0
-    narrow = replace(GAUGES, voltage_range=(-2.0, 2.0))
+    assert gauges.n_clipped(MACHINE, exact) == 0
+    narrow = other(voltage_range=(-2.0, 2.0))
     shown = read(found, np.random.default_rng(0), narrow).voltages
     assert shown.min() == -2.0
     assert gauges.n_clipped(narrow, exact) == int((np.abs(exact) >= 2.0).any(axis=1).sum()) > 0
@@ -135,11 +138,9 @@ def test_voltages_beyond_the_range_are_clipped_and_counted(few):
 
 def test_noise_in_the_voltages_alone_leaves_the_strains_exact(few):
     *_, found = few
-    settings = gauges_of(SECTION.machine, gauges.NOISY_VOLTAGES)
-    shown = read(found, noise_generator(gauges.NOISY_VOLTAGES, 3, 0), settings)
+    shown = read(found, noise_generator(gauges.NOISY_VOLTAGES, 3, 0), exact_strains=True)
     assert np.array_equal(shown.strains, found.axial_strain)
     assert not np.allclose(shown.voltages, read(found).voltages, atol=1e-5)
-    assert gauges_of(SECTION.machine, gauges.NOISY) == GAUGES
 
 
 def test_noise_is_drawn_for_noisy_readings_alone():
@@ -188,9 +189,8 @@ def test_networks_never_see_held_out_readings(tables):
     for kind, inputs in expected.items():
         paths = (tables / "readings.parquet", tables / "readings.noise_free.parquet")
         data = learning_data(kind, *paths)
-        given = data.training, data.selection, data.held_out
-        for name, found in zip((TRAINING, SELECTION, HELD_OUT), given, strict=True):
-            rows = (part == name).to_numpy()
+        for name in (TRAINING, SELECTION, HELD_OUT):
+            rows, found = (part == name).to_numpy(), data.of(name)
             assert rows.sum() > 4
             assert np.array_equal(found[0], inputs[rows])
             assert found[1] == pytest.approx(outputs.get(kind, angles)[rows], abs=1e-15)
@@ -212,7 +212,7 @@ def test_gauges_are_noisy_at_the_targets_too(tables):
         for shown in gauges.SHOWN
     )
     assert (exact[:, 4] < 0.0).any() and exact.shape == (12, 6)
-    uncertain = gauges.uncertainty(GAUGES)
+    uncertain = gauges.uncertainty(MACHINE)
     for shown, strains_are_exact in ((noisy, False), (voltages, True)):
         off = np.abs(shown - exact)
         assert (off[:, [0, 2, 3, 5]] > 0.0).all() and (off < 6 * uncertain).all()
@@ -224,11 +224,10 @@ def test_gauges_are_noisy_at_the_targets_too(tables):
 
 
 def test_inputs_of_the_published_network_are_in_its_order():
-    names = [field.name for field in KINDS["gauges"].inputs]
+    names = list(KINDS["gauges"].inputs)
     assert names == ["dy_1", "dx_1", "dphi_1", "dy_2", "dx_2", "dphi_2", "p_x", "p_y"]
     table = learning_table(
         pd.DataFrame({f.name: [0.0] for f in FIELDS}),
         pd.DataFrame({f.name: [1.0] for f in gauges.FIELDS}),
-        "gauges",
     )
     assert table[names].to_numpy().tolist() == [[1.0] * 8]  # of the gauges, not of the model

@@ -1,6 +1,7 @@
 """The report of the elastic arm: tables, metrics, and what the sentences of its page hold."""
 
 import itertools
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,19 @@ from flexik.reporting.style import MICRO, MM
 from flexik.reporting.tables import Column, Table, mm, table
 
 NOTHING = "nothing"
+POSITIONING = {
+    **{name: name for name in ("method", "knows", "gauges", "hidden", "trainer")},
+    "mean (mm)": mm("mean_error", 3),
+    "median (mm)": mm("median_error", 3),
+    "95 % (mm)": mm("p95_error", 3),
+    "max (mm)": mm("max_error", 3),
+    "failed": "n_failed",
+    "clipped": "clipped",
+    "mean by restart (mm)": "mean_errors",
+    "max by restart (mm)": "max_errors",
+}
+# Fits of networks by the prefix of their columns
+FITS = {"training_": "training", "": "held out", "targets_": "targets", "published_": "published"}
 
 
 def report(section: Section) -> None:
@@ -35,26 +49,18 @@ def report(section: Section) -> None:
 
 def metrics(results: Results) -> dict[str, float | None]:
     """Flat; lengths in mm, rounded to what machines agree on."""
-    found: dict[str, float | None] = {}
-    for name, fit in results.fits.iterrows():
-        for k, r in enumerate(R, start=1):
-            for which in ("", "training_", "targets_"):
-                if np.isfinite(fit[f"{which}{r}"]):
-                    found[f"{name}.{which}r_theta{k}"] = round(fit[f"{which}{r}"], 6)
-        for which in ("mean_error", "max_error"):
-            found[f"{name}.held_out_{which}_mm"] = round(MM * fit[which], 4)
-    names = ["mean_error", "median_error", "p95_error", "max_error"]
-    titles = {
-        "worst_mean_error": "restarts.max_mean_error",
-        "worst_max_error": "restarts.max_max_error",
-        "told": "payload_off_mean_error",
+    r_columns = {
+        f"{which}r_theta{k}": (which + r, 1.0, 6)
+        for k, r in enumerate(R, start=1)
+        for which in ("", "training_", "targets_")
     }
-    for label, row in results.positioning.iterrows():
-        for which in (*names, *titles):
-            if np.isfinite(row[which]):
-                title = titles.get(which, which)
-                found[f"{label}.{title}_mm"] = round(MM * row[which], 4)
-        found[f"{label}.n_failed"] = int(row["n_failed"])
+    held_out = {f"held_out_{e}_mm": (e, MM, 4) for e in ("mean_error", "max_error")}
+    errors = {f"{e}_error": f"{e}_error" for e in ("mean", "median", "p95", "max")}
+    errors |= {f"restarts.max_{e}_error": f"worst_{e}_error" for e in ("mean", "max")}
+    errors["payload_off_mean_error"] = "told"
+    shown = {f"{title}_mm": (column, MM, 4) for title, column in errors.items()}
+    found = _rounded(results.fits, r_columns | held_out)
+    found |= _rounded(results.positioning, shown | {"n_failed": ("n_failed", 1, None)})
     for changed, error in sensitivity(results, results.main).drop(NOTHING).items():
         found[f"{results.main}.{changed}_off_mean_error_mm"] = round(MM * error, 4)
     for k, r in enumerate(R, start=1):
@@ -63,21 +69,27 @@ def metrics(results: Results) -> dict[str, float | None]:
     for name in selected(results):
         for k, n in enumerate(results.layers(name), start=1):
             found[f"select.{name}.n_hidden_{k}"] = n
-    parts = results.of("samples/readings")["part"].value_counts().sort_index()
+    parts = results.readings["part"].value_counts().sort_index()
     return found | {f"readings.n_{part}": int(n) for part, n in parts.items()}
+
+
+def _rounded(
+    frame: pd.DataFrame, columns: Mapping[str, tuple[str, float, int | None]]
+) -> dict[str, float | None]:
+    """Finite values of some columns of all rows: column, factor and digits by title."""
+    return {
+        f"{name}.{title}": round(factor * row[column], digits)
+        for name, row in frame.iterrows()
+        for title, (column, factor, digits) in columns.items()
+        if np.isfinite(row[column])
+    }
 
 
 def tables(results: Results) -> dict[str, Table]:
     """All tables by name."""
-    sets = {
-        "training_": "training",
-        "": "held out",
-        "targets_": "targets",
-        "published_": "published",
-    }
     r_columns = {
         f"R {angle}, {title}": Column(f"{which}{r}", 6 if title == "published" else 8)
-        for which, title in sets.items()
+        for which, title in FITS.items()
         for angle, r in zip(ANGLES, R, strict=True)
     }
     fit_columns = {
@@ -87,18 +99,20 @@ def tables(results: Results) -> dict[str, Table]:
         "max tip error (mm)": mm("max_error"),
         "mean tip error by restart (mm)": "mean_errors",
     }
-    runs = {
-        name: pd.read_csv(results.section.data / f"networks/{name}.restarts.csv").assign(
-            hidden=results.hidden(name)
+    networks = results.section.data / "networks"
+    training = pd.concat(
+        pd.read_csv(networks / f"{name}.restarts.csv").assign(
+            network=name, hidden=results.hidden(name)
         )
         for name in results.section.networks
-    }
-    training = pd.concat(runs, names=["network"]).reset_index("network")
+    )
     front = ["network", "hidden", "restart"]
-    training = training[[*front, *(name for name in training if name not in front)]]
+    training = training[[*front, *training.columns.difference(front, sort=False)]]
     return {
         "sensitivity": sensitivity_table(results),
-        "positioning_errors": positioning_table(results),
+        "positioning_errors": table(
+            results.positioning.rename_axis("method").reset_index(), POSITIONING
+        ),
         "fit": table(results.fits.reset_index(), fit_columns),
         "splits": splits_table(results),
         "gauges": gauges_table(results),
@@ -107,40 +121,20 @@ def tables(results: Results) -> dict[str, Table]:
     }
 
 
-def positioning_table(results: Results) -> Table:
-    """Errors of the methods at the random targets, mm."""
-    texts = ("method", "knows", "gauges", "hidden", "trainer")
-    return table(
-        results.positioning.rename_axis("method").reset_index(),
-        {
-            **{name: name for name in texts},
-            "mean (mm)": mm("mean_error", 3),
-            "median (mm)": mm("median_error", 3),
-            "95 % (mm)": mm("p95_error", 3),
-            "max (mm)": mm("max_error", 3),
-            "failed": "n_failed",
-            "clipped": "clipped",
-            "mean by restart (mm)": "mean_errors",
-            "max by restart (mm)": "max_errors",
-        },
-    )
-
-
 def splits_table(results: Results) -> Table:
     """R of one network on the held-out readings of every division."""
-    splits = results.splits
+    splits, r = results.splits, results.splits[R]
     rows = splits.assign(seed=splits["seed"].astype(str), division="other")
     rows.loc[0, "division"] = "main"
-    below = pd.DataFrame(
-        [splits[R].median(), splits[R].max() - splits[R].min()],
-        index=["median", "largest - least"],
-    )
-    below.loc["published"] = results.fits.loc[
-        results.main, [f"published_{r}" for r in R]
-    ].to_numpy()
-    rows = pd.concat([rows, below.rename_axis("division").reset_index().assign(seed="")])
-    titles = {f"R {angle}": Column(r, 6) for angle, r in zip(ANGLES, R, strict=True)}
-    return table(rows, {"division": "division", "seed": "seed", **titles})
+    published = results.fits.loc[results.main, [f"published_{name}" for name in R]]
+    below = {
+        "median": r.median(),
+        "largest - least": r.max() - r.min(),
+        "published": published.set_axis(R),
+    }
+    rows = pd.concat([rows, pd.DataFrame(below).T.rename_axis("division").reset_index()])
+    titles = {f"R {angle}": Column(name, 6) for angle, name in zip(ANGLES, R, strict=True)}
+    return table(rows.fillna({"seed": ""}), {"division": "division", "seed": "seed", **titles})
 
 
 def sensitivity(results: Results, name: str) -> pd.Series:
@@ -161,17 +155,17 @@ def sensitivity_table(results: Results) -> Table:
 def gauges_table(results: Results) -> Table:
     """Deformation by the gauges minus that of the model, over all readings, mm and mrad."""
     names = list(DEFORMATION)
-    model = results.of("samples/readings")[names]
-    frame = pd.DataFrame({"variable": names}, index=names)
-    frame["unit"] = ["mrad" if name.startswith("dphi") else "mm" for name in names]
+    model = results.readings[names]
+    units = {name: "mrad" if name.startswith("dphi") else "mm" for name in names}
+    frame = pd.DataFrame({"variable": names, "unit": units}, index=names)
     frame["largest, model"] = MM * model.abs().max()
     frame["largest, gauges"] = MM * results.shown(FREE_OF_NOISE)[names].abs().max()
-    uncertain = gauges.uncertainty(gauges.gauges_of(results.section.machine))
-    frame["standard uncertainty, noisy"] = MM * uncertain
+    frame["standard uncertainty, noisy"] = MM * gauges.uncertainty(results.section.machine)
     for noise in (FREE_OF_NOISE, NOISY):
         difference = MM * (results.shown(noise)[names] - model).abs()
-        frame[f"mean difference, {noise.replace('_', '-')}"] = difference.mean()
-        frame[f"max difference, {noise.replace('_', '-')}"] = difference.max()
+        for statistic in ("mean", "max"):
+            title = f"{statistic} difference, {noise.replace('_', '-')}"
+            frame[title] = difference.agg(statistic)
     return Table(frame, dict.fromkeys(map(str, frame.columns[2:]), 5))
 
 
@@ -191,9 +185,10 @@ def size_table(results: Results, name: str) -> Table:
 def values(results: Results) -> dict[str, Any]:
     """What the sentences of the page hold."""
     section, exact = results.section, results.shown(FREE_OF_NOISE)
-    readings = results.of("samples/readings")
+    readings = results.readings
     voltages = exact.filter(like="voltage").to_numpy()
     tip = readings[["tip_x", "tip_y"]].to_numpy()
+    shown = {noise.replace("_", "-"): results.shown(noise) for noise in (FREE_OF_NOISE, NOISY)}
     used = {network.trainer for network in section.networks.values()}
     return {
         "results": results,
@@ -206,12 +201,10 @@ def values(results: Results) -> dict[str, Any]:
         "strain": [exact[f"strain_{link}"].abs().max() for link in (1, 2)],
         "largest_dy": readings[["dy_1", "dy_2"]].abs().to_numpy().max(),
         "voltages": [voltages.min(), voltages.max()],
-        "n_clipped": gauges.n_clipped(gauges.gauges_of(section.machine), voltages),
+        "n_clipped": gauges.n_clipped(section.machine, voltages),
         "gauge_tip": {
-            noise.replace("_", "-"): np.hypot(
-                *(results.shown(noise)[["p_x", "p_y"]].to_numpy() - tip).T
-            )
-            for noise in (FREE_OF_NOISE, NOISY)
+            noise: np.hypot(*(rows[["p_x", "p_y"]].to_numpy() - tip).T)
+            for noise, rows in shown.items()
         },
         "fits": results.fits.to_dict("index"),
         "positioning": results.positioning.to_dict("index"),
@@ -272,7 +265,7 @@ def size_values(results: Results, name: str) -> dict[str, Any]:
     runs, kind = results.of(f"sizes/{name}"), KINDS[str(results.section.networks[name].learns)]
     sizes, tried = results.layers(name), runs.filter(like="n_hidden").max()
     pairs = itertools.pairwise((len(kind.inputs), *sizes, len(kind.outputs)))
-    n_training = int((results.of("samples/readings")["part"] == TRAINING).sum())
+    n_training = int((results.readings["part"] == TRAINING).sum())
     return {
         "select": results.section.networks[name].select,
         "n_goal": int((runs["stop_reason"] == "goal").sum()),

@@ -61,7 +61,7 @@ def deformation(results: Results, link: int) -> Drawing:
     without noise.
     """
     # at 0 no force acts along link 1
-    readings = results.of("samples/readings")
+    readings = results.readings
     rows = np.isclose(readings["theta_1"], readings["theta_1"].max())
     readings = readings[rows]
     exact, noisy = (results.shown(noise)[rows] for noise in (FREE_OF_NOISE, NOISY))

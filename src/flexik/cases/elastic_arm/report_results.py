@@ -64,6 +64,11 @@ class Results:
         """Table data/SECTION/NAME.parquet."""
         return table(self.section.data.absolute() / f"{name}.parquet")
 
+    @property
+    def readings(self) -> pd.DataFrame:
+        """The readings."""
+        return self.of("samples/readings")
+
     def shown(self, noise: str) -> pd.DataFrame:
         """What gauges show in the readings."""
         return self.of(f"samples/readings.{noise}")
@@ -81,7 +86,7 @@ class Results:
         """Readings with what the gauges show and what network `name` says, a row each."""
         shown, fit = self.shown(self.section.networks[name].readings), self.of("studies/fit")
         fit = fit[fit["network"] == name].set_index("reading").drop(columns="network")
-        return pd.concat([self.of("samples/readings"), shown[["p_x", "p_y"]], fit], axis=1)
+        return pd.concat([self.readings, shown[["p_x", "p_y"]], fit], axis=1)
 
     @functools.cached_property
     def errors(self) -> dict[str, pd.DataFrame]:
@@ -160,10 +165,9 @@ class Results:
 
     def on_border(self) -> int:
         """Number of held-out readings on the border of the grid of angles."""
-        readings = self.of("samples/readings")
-        angles = readings[list(ANGLES)].to_numpy()
+        angles = self.readings[list(ANGLES)].to_numpy()
         ends = np.isclose(angles, angles.min(axis=0)) | np.isclose(angles, angles.max(axis=0))
-        return int(ends.any(axis=1)[readings["part"] == HELD_OUT].sum())
+        return int(ends.any(axis=1)[self.readings["part"] == HELD_OUT].sum())
 
     def near_payloads(self, frame: pd.DataFrame) -> NDArray[np.bool_]:
         """Rows (n,) of `frame` whose payload is within NEAR of one of the readings'."""

@@ -1,34 +1,47 @@
 """The section of an elastic two-link arm in params.yaml, and the machine file beside it."""
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from flexik.errors import ParameterError
 from flexik.kinematics.status import REACHED
-from flexik.parameters.conditions import RandomTargets, check_different
-from flexik.parameters.model import (
-    Interval,
-    Model,
-    Name,
-    NotNegative,
-    Positive,
-    Seed,
-    check_increase,
-)
+from flexik.parameters.conditions import RandomTargets
+from flexik.parameters.model import Interval, Model, Name, NotNegative, Positive, Seed
 from flexik.parameters.networks import Axis, check_networks
 from flexik.parameters.networks import Network as AnyNetwork
 from flexik.parameters.section import CaseSection
 from flexik.positioning import method, registry
 
+
+def _increasing(interval: Any) -> Any:
+    if interval[0] >= interval[1]:
+        raise ValueError("must increase")
+    return interval
+
+
+def _different(values: list[Any]) -> list[Any]:
+    if len(set(values)) < len(values):
+        raise ValueError("a value is there twice")
+    return values
+
+
+def _sloping(slope: float) -> float:
+    if slope == 0.0:
+        raise ValueError("a gauge of slope zero tells no deflection")
+    return slope
+
+
 Pair = tuple[Positive, Positive]
 Triple = tuple[float, float, float]
+Slope = Annotated[float, AfterValidator(_sloping)]
 # From wood to diamond, Pa; and what a link of half a metre could carry, kg
 Stiffness = Annotated[float, Field(ge=1e10, le=1.2e12)]
 Payload = Annotated[float, Field(ge=0, le=100)]
 # Below a straight angle either way
 Degrees = Annotated[float, Field(gt=-180, lt=180)]
+Limits = Annotated[tuple[Degrees, Degrees], AfterValidator(_increasing)]
 Share = Annotated[float, Field(gt=0, lt=1)]
 
 # Prefixes of metrics that are no network or method
@@ -43,13 +56,8 @@ class Geometry(Model):
     """Lengths and joint limits."""
 
     lengths: Pair
-    theta_1_degrees: tuple[Degrees, Degrees]
-    theta_2_degrees: tuple[Degrees, Degrees]
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        check_increase(self, "theta_1_degrees", "theta_2_degrees")
-        return self
+    theta_1_degrees: Limits
+    theta_2_degrees: Limits
 
 
 class Tube(Model):
@@ -82,21 +90,13 @@ class Gauges(Model):
 
     deflection_stations: Pair
     strain_stations: Pair
-    slopes: tuple[Triple, Triple]
+    slopes: tuple[tuple[Slope, Slope, Slope], tuple[Slope, Slope, Slope]]
     intercepts: tuple[Triple, Triple]
     noise: NotNegative
-    voltage_range: Interval
+    voltage_range: Annotated[Interval, AfterValidator(_increasing)]
     resolution: NotNegative
     strain_noise: NotNegative
     strain_resolution: NotNegative
-
-    @model_validator(mode="after")
-    def _sloping(self) -> Self:
-        check_increase(self, "voltage_range")
-        for number, slopes in enumerate(self.slopes):
-            if 0.0 in slopes:
-                raise ValueError(f"slopes.{number}: a gauge of slope zero tells no deflection")
-        return self
 
 
 class Machine(Model):
@@ -130,7 +130,7 @@ class Samples(Model):
 
     theta_1_degrees: DegreeAxis
     theta_2_degrees: DegreeAxis
-    payloads: Annotated[list[Payload], Field(min_length=1)]
+    payloads: Annotated[list[Payload], Field(min_length=1), AfterValidator(_different)]
     selection_share: Share
     held_out_share: Share
     seed: Seed
@@ -138,24 +138,19 @@ class Samples(Model):
 
     @model_validator(mode="after")
     def _divided(self) -> Self:
-        if self.selection_share + self.held_out_share >= 1.0:
-            raise ValueError("held_out_share: leaves no reading to train with")
-        check_different("payloads", self.payloads)
-        if self.n_readings > MAXIMUM_READINGS:
+        n = self.n_readings
+        if n > MAXIMUM_READINGS:
             raise ValueError(
-                f"theta_1_degrees.increment, theta_2_degrees.increment: {self.n_readings} "
-                f"readings, at most {MAXIMUM_READINGS}"
+                f"theta_1_degrees.increment, theta_2_degrees.increment: {n} readings, at most "
+                f"{MAXIMUM_READINGS}"
             )
-        n, least = self.n_readings, MINIMUM_PART
         held_out, selection = round(self.held_out_share * n), round(self.selection_share * n)
-        for key, part in (("held_out_share", held_out), ("selection_share", selection)):
-            if part < least:
-                raise ValueError(f"{key}: {part} of {n} readings, expected {least} or more")
-        if n - held_out - selection < least:
-            raise ValueError(
-                f"selection_share, held_out_share: leave {n - held_out - selection} of {n} "
-                f"readings to train with, expected {least} or more"
-            )
+        parts = {"held_out_share": held_out, "selection_share": selection}
+        parts["held_out_share, selection_share"] = n - held_out - selection
+        for key, part in parts.items():
+            if part < MINIMUM_PART:
+                what = "are left to train with" if "," in key else f"of {n}"
+                raise ValueError(f"{key}: {part} readings {what}, expected {MINIMUM_PART} or more")
         return self
 
     @property
@@ -192,22 +187,14 @@ class Gauge(method.Settings):
     method: Literal["gauges"]
 
 
-if TYPE_CHECKING:
-    AnyMethod = method.Settings
-else:
-    AnyMethod = Annotated[Gauge | registry.AnyMethod, Field(discriminator="method")]
+AnyMethod = Annotated[Gauge | registry.AnyMethod, Field(discriminator="method")]
 
 
 class Splits(Model):
     """Other divisions of the readings, by which one network is trained and judged again."""
 
     network: Name
-    seeds: Annotated[list[Seed], Field(min_length=1)]
-
-    @model_validator(mode="after")
-    def _once(self) -> Self:
-        check_different("seeds", self.seeds)
-        return self
+    seeds: Annotated[list[Seed], Field(min_length=1), AfterValidator(_different)]
 
 
 class Studies(Model):
@@ -271,21 +258,18 @@ class Section(CaseSection):
     def _check_methods(self) -> None:
         if not any(given.method == "none" for given in self.methods.values()):
             raise ValueError("methods: none is not there, which the others are compared with")
-        gauges = {k: given for k, given in self.methods.items() if isinstance(given, Gauge)}
-        others = {k: given for k, given in self.methods.items() if k not in gauges}
+        others = {k: given for k, given in self.methods.items() if not isinstance(given, Gauge)}
         registry.check_methods(others, self.networks)
-        for label, given in gauges.items():
-            if given.network not in self.gauge_networks:
+        for label, given in self.methods.items():
+            if label not in others and given.network not in self.gauge_networks:
                 raise ValueError(
                     f"methods.{label}.network: {given.network!r} is no network given gauges "
                     f"({', '.join(self.gauge_networks)})"
                 )
-        for label, method_of in self.methods.items():
-            if label in self.networks and method_of.network != label:
+            if label in self.networks and given.network != label:
                 raise ValueError(f"methods.{label}: the name of another network than its own")
-        for name in (*self.networks, *self.methods):
-            if name in TAKEN_NAMES:
-                raise ValueError(f"methods.{name}: the name is taken")
+        for name in {*self.networks, *self.methods}.intersection(TAKEN_NAMES):
+            raise ValueError(f"methods.{name}: the name is taken")
 
 
 def check(section: Section) -> None:

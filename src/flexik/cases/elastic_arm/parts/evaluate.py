@@ -1,7 +1,7 @@
 """Errors of every method at the random targets, by the chosen network and by its other starts."""
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flexik.cases.elastic_arm.parts.arm import flexible_arm
 from flexik.cases.elastic_arm.parts.gauge_method import GaugeNetwork
 from flexik.cases.elastic_arm.parts.kinds import KINDS
-from flexik.cases.elastic_arm.parts.readings import FIELDS
+from flexik.cases.elastic_arm.parts.readings import FIELDS, QUERY
 from flexik.cases.elastic_arm.parts.trained import RESTART, Trained, files_of, restarts
 from flexik.cases.elastic_arm.section import Gauge, Machine, Network, Section
 from flexik.datasets.parts import Part, Work, Writer, stacked, table
@@ -24,11 +24,6 @@ from flexik.multibody.elastic_arm import FlexibleArm, equilibria
 from flexik.positioning import registry
 from flexik.positioning.method import Array, Columns, Ingredients, Method, Settings
 
-QUERY = (
-    Field("target_x", "m", "target, forward"),
-    Field("target_y", "m", "target, upward"),
-    Field("payload", "kg", "point mass at the tip"),
-)
 RESTART_FIELDS = (
     *RESTART,
     Field("mean_error", "m", "over all conditions"),
@@ -55,7 +50,7 @@ def described(section: Section, conditions: str, label: str) -> dict[str, dict[s
         settings["network"], inputs["files"] = network, files_of(section, method.network)
         if network.has_gauges:
             inputs["shown"] = samples / f"{conditions}.{network.readings}.parquet"
-    settings["build"] = gauge_method if isinstance(method, Gauge) else registry.build_of(method)
+    settings["build"] = None if isinstance(method, Gauge) else registry.build_of(method)
     return {"settings": settings, "inputs": inputs}
 
 
@@ -63,14 +58,16 @@ def prepare(
     *,
     machine: Machine,
     method: Settings,
-    build: Callable[..., Method],
+    build: registry.Build | None,
     targets: Path,
     network: Network | None = None,
     files: Mapping[str, Path] | None = None,
     shown: Path | None = None,
 ) -> Work:
     """A method with the network of every start; the table is of the chosen one."""
-    conditions = conditions_of(targets)
+    query = read_table(targets)[[field.name for field in QUERY]].to_numpy()
+    # from the stretched arm: only what no method solves would stay there
+    conditions = Conditions(query, np.zeros((len(query), 2)), np.arange(len(query)))
     deformation = read_table(shown)[list(DEFORMATION)].to_numpy() if shown else None
     found: list[Trained | None] = [None]
     if network is not None and files is not None:
@@ -82,7 +79,7 @@ def prepare(
 def errors(
     machine: Machine,
     settings: Settings,
-    build: Callable[..., Method],
+    build: registry.Build | None,
     conditions: Conditions,
     deformation: Array | None,
     trained: Trained | None,
@@ -90,29 +87,17 @@ def errors(
 ) -> dict[str, NDArray]:
     """Long table of a method whose network is `trained`; payloads are told kg too much."""
     arm = flexible_arm(machine)
-    ingredients = Ingredients(arm.geometry, trained.network if trained else None)
-    extra = () if deformation is None or trained is None else (trained.learns, deformation)
-    method = build(settings, ingredients, *extra)
+    method: Method
+    if build is not None:
+        method = build(settings, Ingredients(arm.geometry, trained.network if trained else None))
+    else:
+        assert trained is not None and deformation is not None  # the section sees to it
+        inputs = KINDS[trained.settings.learns].inputs
+        method = GaugeNetwork(arm.geometry, trained.network, inputs, deformation)
     rows = conditions[: settings.n_targets]
     told = replace(rows, query=rows.query + np.array([0.0, 0.0, told_too_much]))
     judge = tip_judge(lambda angles, _: equilibria(arm, angles, rows.query[:, 2]).tip)
     return evaluate(method, told, judge, columns(arm))
-
-
-def gauge_method(
-    settings: Settings, ingredients: Ingredients, learns: str, deformation: Array
-) -> GaugeNetwork:
-    """Method `gauges` that is told `deformation` (n, 6)."""
-    assert ingredients.network is not None  # the section sees to it
-    return GaugeNetwork(
-        ingredients.manipulator, ingredients.network, KINDS[learns].input_names, deformation
-    )
-
-
-def conditions_of(targets: Path) -> Conditions:
-    """Targets and payloads, from the stretched arm: only what no method solves would stay there."""
-    query = read_table(targets)[[field.name for field in QUERY]].to_numpy()
-    return Conditions(query, np.zeros((len(query), 2)), np.arange(len(query)))
 
 
 def columns(arm: FlexibleArm) -> Columns:
@@ -125,18 +110,18 @@ def written(
     columns: Columns, trained: Sequence[Trained | None], results: Sequence[Mapping[str, NDArray]]
 ) -> dict[str, Writer]:
     """Table of the chosen start, and mean and largest errors of all."""
-    kept = next(k for k, network in enumerate(trained) if network is None or network.is_chosen)
-    fields = fields_of(results[kept], columns)
-    writers = {".parquet": table(results[kept], fields)}
-    if trained[kept] is not None:
-        rows = [
-            {
-                **network.row,
-                "mean_error": np.mean(found["error"], keepdims=True),
-                "max_error": np.max(found["error"], keepdims=True),
-            }
-            for network, found in zip(trained, results, strict=True)
-            if network is not None
-        ]
+    pairs = list(zip(trained, results, strict=True))
+    kept = next(found for network, found in pairs if network is None or network.is_chosen)
+    writers = {".parquet": table(kept, fields_of(kept, columns))}
+    rows = [
+        network.row
+        | {
+            "mean_error": found["error"].mean(keepdims=True),
+            "max_error": found["error"].max(keepdims=True),
+        }
+        for network, found in pairs
+        if network is not None
+    ]
+    if rows:
         writers[".restarts.parquet"] = table(stacked(rows, RESTART_FIELDS), RESTART_FIELDS)
     return writers

@@ -11,7 +11,6 @@ the same noise of its voltage. Their mean is weighted by the inverse squares of 
 squares does.
 """
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -27,28 +26,6 @@ FREE_OF_NOISE, NOISY, NOISY_VOLTAGES = "noise_free", "noisy", "noisy_voltages"
 SHOWN = (FREE_OF_NOISE, NOISY, NOISY_VOLTAGES)
 # Noise at the readings and at random targets is not the same
 STREAM_OF_READINGS, STREAM_OF_TARGETS = 0, 1
-
-
-@dataclass(frozen=True)
-class Gauges:
-    """Gauges of both links.
-
-    lengths, stations : of the links, and of gauge 3 from the joints, m.
-    slopes, intercepts : calibration lines, m/V and m, by link those of gauges 1 to 3.
-    noise, resolution : standard deviation and step of a voltage, V.
-    voltage_range : least and largest voltage that is measured, V; what is beyond is clipped.
-    strain_noise, strain_resolution : the same of an axial strain.
-    """
-
-    lengths: tuple[float, float]
-    stations: tuple[float, float]
-    slopes: tuple[tuple[float, float, float], tuple[float, float, float]]
-    intercepts: tuple[tuple[float, float, float], tuple[float, float, float]]
-    noise: float
-    voltage_range: tuple[float, float]
-    resolution: float
-    strain_noise: float
-    strain_resolution: float
 
 
 class GaugeReadings(NamedTuple):
@@ -85,31 +62,26 @@ FIELDS = (
 )
 
 
-def gauges_of(machine: Machine, shown: str = NOISY) -> Gauges:
-    """The gauges of `machine` as `shown` says: strains exact where noisy_voltages."""
-    given = machine.gauges.model_dump(exclude={"deflection_stations", "strain_stations"})
-    if shown == NOISY_VOLTAGES:
-        given |= {"strain_noise": 0.0, "strain_resolution": 0.0}
-    return Gauges(machine.geometry.lengths, machine.gauges.deflection_stations, **given)
-
-
 def noise_generator(shown: str, seed: int, stream: int) -> np.random.Generator | None:
     """Source of the noise that is `shown`: none where there is none."""
     return None if shown == FREE_OF_NOISE else np.random.default_rng((seed, stream))
 
 
 def read(
-    gauges: Gauges,
+    machine: Machine,
     deformation: Array,
     station_deflection: Array,
     axial_strain: Array,
     generator: np.random.Generator | None,
+    *,
+    exact_strains: bool = False,
 ) -> GaugeReadings:
-    """What `gauges` show of links with `deformation` (n, 6) in m and rad.
+    """What the gauges show of links with `deformation` (n, 6) in m and rad.
 
     `station_deflection` (n, 2) in m and `axial_strain` (n, 2) are those at the gauges. `generator`
     draws the noise; without it there is neither noise nor resolution nor an end of the range.
     """
+    gauges = machine.gauges
     tip = deformation[:, [0, 3]]
     slopes, intercepts = np.array(gauges.slopes), np.array(gauges.intercepts)
     deflection = np.stack([tip, tip, station_deflection], axis=2)
@@ -119,29 +91,29 @@ def read(
         voltages = np.clip(
             _measured(voltages, gauges.noise, gauges.resolution, generator), *gauges.voltage_range
         )
-        strains = _measured(strains, gauges.strain_noise, gauges.strain_resolution, generator)
-    return GaugeReadings(voltages, strains, _deformation(gauges, voltages, strains))
+        if not exact_strains:
+            strains = _measured(strains, gauges.strain_noise, gauges.strain_resolution, generator)
+    return GaugeReadings(voltages, strains, _deformation(machine, voltages, strains))
 
 
-def uncertainty(gauges: Gauges) -> Array:
+def uncertainty(machine: Machine) -> Array:
     """Standard uncertainty (6,) of each deformation variable in m and rad, by noise and resolution.
 
     A step s adds the standard deviation s / sqrt(12) of an error uniform within it.
     """
+    gauges, found = machine.gauges, []
     volt = np.hypot(gauges.noise, gauges.resolution / np.sqrt(12.0))
     strain = np.hypot(gauges.strain_noise, gauges.strain_resolution / np.sqrt(12.0))
-    found = []
-    for length, station, slopes in zip(
-        gauges.lengths, gauges.stations, np.array(gauges.slopes), strict=True
-    ):
+    lines = zip(*_arms(machine), np.array(gauges.slopes), strict=True)
+    for length, apart, slopes in lines:
         dy = volt * np.linalg.norm(_weights(slopes[:2]) * slopes[:2])
-        found += [dy, length * strain, np.hypot(dy, volt * slopes[2]) / (length - station)]
+        found += [dy, length * strain, np.hypot(dy, volt * slopes[2]) / apart]
     return np.array(found)
 
 
-def n_clipped(gauges: Gauges, voltages: Array) -> int:
+def n_clipped(machine: Machine, voltages: Array) -> int:
     """Number of rows of `voltages` (n, 6) in V with one at an end of the range or beyond."""
-    low, high = gauges.voltage_range
+    low, high = machine.gauges.voltage_range
     return int(np.any((voltages <= low) | (voltages >= high), axis=1).sum())
 
 
@@ -151,16 +123,22 @@ def _weights(slopes: Array) -> Array:
     return np.asarray(inverse / inverse.sum())
 
 
-def _deformation(gauges: Gauges, voltages: Array, strains: Array) -> Array:
+def _arms(machine: Machine) -> tuple[Array, Array]:
+    """Lengths (2,) of the links, and from gauge 3 to the tip (2,), m."""
+    lengths = np.array(machine.geometry.lengths)
+    return lengths, lengths - machine.gauges.deflection_stations
+
+
+def _deformation(machine: Machine, voltages: Array, strains: Array) -> Array:
     """Equations 47 to 54, backwards from `voltages` (n, 6) and `strains` (n, 2)."""
-    slopes, intercepts = np.array(gauges.slopes), np.array(gauges.intercepts)
+    slopes, intercepts = np.array(machine.gauges.slopes), np.array(machine.gauges.intercepts)
+    lengths, apart = _arms(machine)
     deflection = voltages.reshape(-1, 2, 3) * slopes + intercepts
     columns = []
     for link in (0, 1):
         tip = deflection[:, link, :2] @ _weights(slopes[link, :2])
-        apart = gauges.lengths[link] - gauges.stations[link]
-        rotation = np.arctan((tip - deflection[:, link, 2]) / apart)
-        columns += [tip, strains[:, link] * gauges.lengths[link], rotation]
+        rotation = np.arctan((tip - deflection[:, link, 2]) / apart[link])
+        columns += [tip, strains[:, link] * lengths[link], rotation]
     return np.column_stack(columns)
 
 

@@ -1,5 +1,7 @@
 """Readings of the experiment on the flexible arm, random targets, and what gauges show there."""
 
+from typing import Any
+
 import numpy as np
 
 from flexik.cases.elastic_arm.parts import gauges
@@ -7,6 +9,7 @@ from flexik.cases.elastic_arm.parts.arm import flexible_arm
 from flexik.cases.elastic_arm.parts.readings import (
     ANGLES,
     FIELDS,
+    QUERY,
     columns_of,
     degree_axis,
     divide,
@@ -22,9 +25,7 @@ from flexik.multibody.elastic_arm import Equilibria, FlexibleArm, equilibria, so
 from flexik.parameters.conditions import RandomTargets
 
 TARGET_FIELDS = (
-    Field("target_x", "m", "target, forward"),
-    Field("target_y", "m", "target, upward"),
-    Field("payload", "kg", "point mass at the tip"),
+    *QUERY,
     *(Field(name, "rad", "puts the loaded tip on the target") for name in ANGLES),
 )
 # candidates drawn for each target that is wanted, at most
@@ -41,16 +42,14 @@ def parts(section: Section) -> list[Part]:
     return found
 
 
-def prepare_readings(*, machine: Machine, samples: Samples) -> Work:
+def prepare_readings(**settings: Any) -> Work:
     """All readings, divided into training, selection and held-out ones."""
-    return whole(_readings, machine=machine, samples=samples)
+    return whole(_readings, **settings)
 
 
-def prepare_targets(
-    *, machine: Machine, samples: Samples, key: str, workspace: RandomTargets
-) -> Work:
+def prepare_targets(**settings: Any) -> Work:
     """Random targets and payloads that the loaded arm can be put on, and how many were drawn."""
-    return whole(_targets, machine=machine, samples=samples, key=key, workspace=workspace)
+    return whole(_targets, **settings)
 
 
 def _readings(machine: Machine, samples: Samples) -> dict[str, Writer]:
@@ -72,7 +71,8 @@ def _shown(
     writers = {}
     for shown in gauges.SHOWN:
         generator = gauges.noise_generator(shown, seed, stream)
-        read = gauges.read(gauges.gauges_of(machine, shown), *found[1:], generator)
+        exact = shown == gauges.NOISY_VOLTAGES
+        read = gauges.read(machine, *found[1:], generator, exact_strains=exact)
         tip = flexible_forward(flexible_arm(machine).geometry, angles, read.deformation)
         columns = columns_of([*read, tip], gauges.FIELDS)
         writers[f".{shown}.parquet"] = table(columns, gauges.FIELDS)
@@ -100,17 +100,11 @@ def _targets(
     ]
     print(f"{n_found} of {n_drawn} random targets are reached, {wanted} kept")
     _, payload, angles = columns
-    shown = _shown(
-        machine,
-        angles,
-        equilibria(arm, angles, payload),
-        samples.noise_seed,
-        gauges.STREAM_OF_TARGETS,
-    )
+    solved, seed = equilibria(arm, angles, payload), samples.noise_seed
     return {
         ".parquet": table(columns_of(columns, TARGET_FIELDS), TARGET_FIELDS),
         ".json": json_file({"drawn": n_drawn, "reached": n_found, "kept": wanted}),
-        **shown,
+        **_shown(machine, angles, solved, seed, gauges.STREAM_OF_TARGETS),
     }
 
 

@@ -1,9 +1,9 @@
 """What the networks of the arm are trained with."""
 
-from pathlib import Path
 from typing import Any
 
-from flexik.cases.elastic_arm.parts.kinds import KINDS, LearningData, learning_data
+from flexik.cases.elastic_arm.parts.kinds import KINDS, LearningData, fields
+from flexik.cases.elastic_arm.parts.readings import SELECTION, TRAINING
 from flexik.cases.elastic_arm.section import Network, Section
 from flexik.learning.perceptron import quantities
 from flexik.learning.training import Architecture, Lesson
@@ -24,18 +24,13 @@ def lesson(
     network: Network, n_hidden: tuple[int, ...], trainer: Stopping, data: LearningData
 ) -> Lesson:
     """Training of `network` with `n_hidden` units by the readings of `data`; none is held out."""
-    kind = KINDS[str(network.learns)]
+    kind = KINDS[network.learns]
     return Lesson(
-        *data.training,
-        quantities(kind.inputs),
-        quantities(kind.outputs),
-        Architecture(n_hidden if len(n_hidden) > 1 else n_hidden[0], network.activation),
+        *data.of(TRAINING),
+        quantities(fields(kind.inputs)),
+        quantities(fields(kind.outputs)),
+        Architecture(n_hidden, network.activation),
         trainer,
         network.seed,
-        data.selection,
+        data.of(SELECTION),
     )
-
-
-def data_of(network: Network, readings: Path, shown: Path) -> LearningData:
-    """All readings as `network` learns them."""
-    return learning_data(str(network.learns), readings, shown)

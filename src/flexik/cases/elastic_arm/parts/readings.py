@@ -13,10 +13,17 @@ Array = NDArray[np.float64]
 TRAINING, SELECTION, HELD_OUT = "training", "selection", "held_out"
 ANGLES = ("theta_1", "theta_2")
 
+PAYLOAD = Field("payload", "kg", "point mass at the tip")
+# What methods are asked for
+QUERY = (
+    Field("target_x", "m", "target, forward"),
+    Field("target_y", "m", "target, upward"),
+    PAYLOAD,
+)
 FIELDS = (
     Field("theta_1", "rad", "angle of joint 1"),
     Field("theta_2", "rad", "angle of joint 2"),
-    Field("payload", "kg", "point mass at the tip"),
+    PAYLOAD,
     Field("part", "1", "training, selection or held_out", "string"),
     Field("rigid_x", "m", "tip of the rigid arm, forward"),
     Field("rigid_y", "m", "tip of the rigid arm, upward"),
@@ -44,8 +51,7 @@ FIELDS = (
 
 def degree_axis(axis: DegreeAxis) -> Array:
     """Angles (k,) in rad, both ends included."""
-    n = round((axis.maximum - axis.minimum) / axis.increment) + 1
-    return np.radians(np.linspace(axis.minimum, axis.maximum, n))
+    return np.radians(np.linspace(axis.minimum, axis.maximum, axis.n_values))
 
 
 def poses(samples: Samples) -> tuple[Array, Array]:

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from flexik.cases.elastic_arm.parts.lessons import data_of, described, lesson
+from flexik.cases.elastic_arm.parts.kinds import learning_data
+from flexik.cases.elastic_arm.parts.lessons import described, lesson
 from flexik.cases.elastic_arm.section import Network, Section
 from flexik.datasets.parts import Part, Work
 from flexik.learning.size_selection import select
@@ -20,6 +21,6 @@ def parts(section: Section) -> list[Part]:
 
 def prepare(*, network: Network, trainer: Stopping, readings: Path, shown: Path) -> Work:
     """A size from one start is an item."""
-    sizes, data = network.sizes, data_of(network, readings, shown)
+    sizes, data = network.sizes, learning_data(network.learns, readings, shown)
     common = lesson(network, sizes[0], trainer, data)
     return select(common, sizes, network.select.n_restarts, network.select.tolerance)

@@ -1,7 +1,7 @@
 """Studies of the arm: fit and sensitivity of networks given gauges, payload error, divisions."""
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from flexik.cases.elastic_arm.parts import evaluate, gauges, study_splits
@@ -25,24 +25,17 @@ def parts(section: Section) -> list[Part]:
         for label, method in section.methods.items()
         if method.needs and not isinstance(method, Gauge)
     }
+    settings = {
+        "methods": {label: of["settings"] for label, of in told.items()},
+        "too_much": section.studies.payload_error,
+    }
+    files = {label: of["inputs"] for label, of in told.items()}
+    gauge_part = functools.partial(_gauge_part, section)
+    main = section.studies.splits.network
     return [
-        _gauge_part(section, "fit", prepare_fit, list(section.gauge_networks)),
-        _gauge_part(
-            section,
-            "sensitivity",
-            prepare_sensitivity,
-            compared(section),
-            with_restarts=section.studies.splits.network,
-        ),
-        Part(
-            "payload_error",
-            prepare_payload_error,
-            {
-                "methods": {label: of["settings"] for label, of in told.items()},
-                "too_much": section.studies.payload_error,
-            },
-            {"files": {label: of["inputs"] for label, of in told.items()}},
-        ),
+        gauge_part("fit", prepare_fit, section.gauge_networks),
+        gauge_part("sensitivity", prepare_sensitivity, compared(section), with_restarts=main),
+        Part("payload_error", prepare_payload_error, settings, {"files": files}),
         study_splits.part(section),
     ]
 
@@ -54,19 +47,19 @@ def compared(section: Section) -> list[str]:
 
 
 def _gauge_part(
-    section: Section, name: str, prepare: Callable[..., Work], networks: list[str], **settings: str
+    section: Section,
+    name: str,
+    prepare: Callable[..., Work],
+    networks: Iterable[str],
+    **settings: str,
 ) -> Part:
-    common = {
-        "machine": section.machine,
-        "networks": {network: section.networks[network] for network in networks},
-    }
-    samples = section.data / "samples"
-    inputs = {
-        "readings": samples / "readings.parquet",
-        "shown": {s: samples / f"readings.{s}.parquet" for s in gauges.SHOWN},
-        "files": {network: files_of(section, network) for network in networks},
-    }
-    return Part(name, prepare, common | settings, inputs)
+    known = {network: section.networks[network] for network in networks}
+    readings = section.data / "samples/readings"
+    tables = {"": readings.with_suffix(".parquet")}
+    tables |= {shown: readings.with_suffix(f".{shown}.parquet") for shown in gauges.SHOWN}
+    files = {network: files_of(section, network) for network in known}
+    given = {"machine": section.machine, "networks": known, **settings}
+    return Part(name, prepare, given, {"tables": tables, "files": files})
 
 
 def prepare_payload_error(

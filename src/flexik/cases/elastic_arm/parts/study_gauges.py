@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from flexik.cases.elastic_arm.parts import gauges
 from flexik.cases.elastic_arm.parts.arm import flexible_arm
+from flexik.cases.elastic_arm.parts.geometry import geometry_of
 from flexik.cases.elastic_arm.parts.kinds import KINDS, learning_table
-from flexik.cases.elastic_arm.parts.readings import ANGLES, HELD_OUT, TRAINING
+from flexik.cases.elastic_arm.parts.readings import ANGLES, HELD_OUT, TRAINING, columns_of
 from flexik.cases.elastic_arm.parts.trained import NETWORK, RESTART, Trained, restarts
 from flexik.cases.elastic_arm.section import Machine, Network
 from flexik.datasets.parts import Work, Writer, rows, stacked, table
@@ -55,14 +56,13 @@ def prepare_fit(
     *,
     machine: Machine,
     networks: Mapping[str, Network],
-    readings: Path,
-    shown: Mapping[str, Path],
+    tables: Mapping[str, Path],
     files: Mapping[str, Mapping[str, Path]],
 ) -> Work:
     """R and tip errors of the networks of all starts; the table is of the chosen ones."""
-    tables = _tables(readings, shown)
-    found = [t for name, n in networks.items() for t in restarts(name, n, files[name])]
-    return Work(functools.partial(_fit, machine, tables), found, functools.partial(_written, found))
+    function = functools.partial(_fit, machine, _read(tables))
+    found = _restarts(networks, files)
+    return Work(function, found, functools.partial(_written, found))
 
 
 def prepare_sensitivity(
@@ -70,71 +70,64 @@ def prepare_sensitivity(
     machine: Machine,
     networks: Mapping[str, Network],
     with_restarts: str,
-    readings: Path,
-    shown: Mapping[str, Path],
+    tables: Mapping[str, Path],
     files: Mapping[str, Mapping[str, Path]],
 ) -> Work:
     """Tip errors with no input off, then each by its uncertainty; of one network from every start.
 
     The uncertainty is that of the gauges with noise, whether the network learnt with it or not.
     """
-    tables = _tables(readings, shown)
-    every = [t for name, n in networks.items() for t in restarts(name, n, files[name])]
-    found = [t for t in every if t.is_chosen or t.name == with_restarts]
-    return Work(functools.partial(_sensitivity, machine, tables), found, rows(*SENSITIVITY_FIELDS))
+    function = functools.partial(_sensitivity, machine, _read(tables))
+    found = [t for t in _restarts(networks, files) if t.is_chosen or t.name == with_restarts]
+    return Work(function, found, rows(*SENSITIVITY_FIELDS))
 
 
-def _tables(readings: Path, shown: Mapping[str, Path]) -> dict[str, pd.DataFrame]:
-    return {"": read_table(readings)} | {name: read_table(path) for name, path in shown.items()}
+def _read(tables: Mapping[str, Path]) -> dict[str, pd.DataFrame]:
+    return {name: read_table(path) for name, path in tables.items()}
+
+
+def _restarts(
+    networks: Mapping[str, Network], files: Mapping[str, Mapping[str, Path]]
+) -> list[Trained]:
+    return [t for name, network in networks.items() for t in restarts(name, network, files[name])]
 
 
 def _fit(machine: Machine, tables: Mapping[str, pd.DataFrame], trained: Trained) -> Columns:
     readings, shown = tables[""], tables[trained.settings.readings]
-    arm = flexible_arm(machine)
-    angles = trained.network.predict(_inputs(readings, shown, trained.learns))
-    tip = flexible_forward(arm.geometry, angles, shown[list(DEFORMATION)].to_numpy())
+    angles = trained.network.predict(_inputs(readings, shown, trained.settings.learns))
+    tip = flexible_forward(geometry_of(machine), angles, shown[list(DEFORMATION)].to_numpy())
     part, right = readings["part"].to_numpy(), readings[list(ANGLES)].to_numpy()
     r = [correlation(right[part == p], angles[part == p]) for p in (TRAINING, HELD_OUT)]
     error = _tip_error(machine, angles[part == HELD_OUT], readings[part == HELD_OUT])
-    statistics = [*r[0], *r[1], error.mean(), error.max()]
-    names = [field.name for field in FIT_RESTART_FIELDS[3:]]
-    return {
-        "angles": angles,
-        "tip": tip,
-        **{name: np.array([value]) for name, value in zip(names, statistics, strict=True)},
-    }
+    statistics = np.array([*r[0], *r[1], error.mean(), error.max()])[:, None]
+    by_reading = columns_of([np.arange(len(angles)), angles, tip], FIT_FIELDS[1:])
+    return {**by_reading, **columns_of(list(statistics), FIT_RESTART_FIELDS[3:])}
 
 
 def _written(trained: Sequence[Trained], results: Sequence[Columns]) -> dict[str, Writer]:
-    statistics = [{**found, **network.row} for network, found in zip(trained, results, strict=True)]
+    pairs = list(zip(trained, results, strict=True))
+    starts = [{**found, **network.row} for network, found in pairs]
     fits = [
-        {
-            "network": np.full(len(found["angles"]), network.name),
-            "reading": np.arange(len(found["angles"])),
-            **dict(zip(("network_theta_1", "network_theta_2"), found["angles"].T, strict=True)),
-            **dict(zip(("network_p_x", "network_p_y"), found["tip"].T, strict=True)),
-        }
-        for network, found in zip(trained, results, strict=True)
+        {**found, "network": np.repeat(network.name, len(found["reading"]))}
+        for network, found in pairs
         if network.is_chosen
     ]
     return {
         ".parquet": table(stacked(fits, FIT_FIELDS), FIT_FIELDS),
-        ".restarts.parquet": table(stacked(statistics, FIT_RESTART_FIELDS), FIT_RESTART_FIELDS),
+        ".restarts.parquet": table(stacked(starts, FIT_RESTART_FIELDS), FIT_RESTART_FIELDS),
     }
 
 
 def _sensitivity(machine: Machine, tables: Mapping[str, pd.DataFrame], trained: Trained) -> Columns:
     held_out = tables[""]["part"] == HELD_OUT
     readings, shown = tables[""][held_out], tables[trained.settings.readings][held_out]
-    inputs = _inputs(readings, shown, trained.learns)
-    names = KINDS[trained.learns].input_names
-    uncertain = gauges.uncertainty(gauges.gauges_of(machine)).tolist()
+    inputs = _inputs(readings, shown, trained.settings.learns)
+    names = KINDS[trained.settings.learns].inputs
+    uncertain = gauges.uncertainty(machine).tolist()
     changes = {"nothing": 0.0, **dict(zip(DEFORMATION, uncertain, strict=True))}
     changes = {name: off for name, off in changes.items() if name in ("nothing", *names)}
-    errors = []
-    for name, off in changes.items():
-        angles = trained.network.predict(inputs + off * (np.array(names) == name))
-        errors.append(_tip_error(machine, angles, readings).mean())
+    asked = [inputs + off * (np.array(names) == name) for name, off in changes.items()]
+    errors = [_tip_error(machine, trained.network.predict(x), readings).mean() for x in asked]
     return {
         **{key: np.repeat(value, len(changes)) for key, value in trained.row.items()},
         "input": np.array(list(changes)),
@@ -145,7 +138,7 @@ def _sensitivity(machine: Machine, tables: Mapping[str, pd.DataFrame], trained: 
 
 def _inputs(readings: pd.DataFrame, shown: pd.DataFrame, learns: str) -> Array:
     """Inputs (n, p) of a network in `readings`."""
-    return learning_table(readings, shown, learns)[list(KINDS[learns].input_names)].to_numpy()
+    return learning_table(readings, shown)[list(KINDS[learns].inputs)].to_numpy()
 
 
 def _tip_error(machine: Machine, angles: Array, readings: pd.DataFrame) -> Array:

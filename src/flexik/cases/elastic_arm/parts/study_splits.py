@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.cases.elastic_arm.parts.kinds import LearningData
-from flexik.cases.elastic_arm.parts.lessons import data_of, described, lesson
-from flexik.cases.elastic_arm.parts.readings import ANGLES, divide
+from flexik.cases.elastic_arm.parts.kinds import LearningData, learning_data
+from flexik.cases.elastic_arm.parts.lessons import described, lesson
+from flexik.cases.elastic_arm.parts.readings import ANGLES, HELD_OUT, divide
 from flexik.cases.elastic_arm.section import Network, Samples, Section
 from flexik.datasets.parts import Part, Work, rows
 from flexik.datasets.tables import Field
@@ -47,7 +47,7 @@ def prepare(
     shown: Path,
 ) -> Work:
     """A division is an item."""
-    data = data_of(network, readings, shown)
+    data = learning_data(network.learns, readings, shown)
     return Work(functools.partial(_r, network, trainer, samples, data), seeds, rows(*FIELDS))
 
 
@@ -61,6 +61,6 @@ def _r(
         best = train_best(lesson(network, network.sizes[0], trainer, data), network.n_restarts)[0]
     except TrainingError as error:
         raise TrainingError(f"division {seed}: {error}") from None
-    inputs, angles = data.held_out
+    inputs, angles = data.of(HELD_OUT)
     r = correlation(angles, best.predict(inputs))
     return {"seed": np.array([seed])} | {f"r_{name}": r[[k]] for k, name in enumerate(ANGLES)}

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from flexik.cases.elastic_arm.parts.lessons import data_of, described, lesson
+from flexik.cases.elastic_arm.parts.kinds import learning_data
+from flexik.cases.elastic_arm.parts.lessons import described, lesson
 from flexik.cases.elastic_arm.section import Network, Section
 from flexik.datasets.parts import Part, Work
 from flexik.learning.fit import fit
@@ -26,5 +27,5 @@ def prepare(
 ) -> Work:
     """A start is an item."""
     n_hidden = network.sizes[0] if size is None else read_layers(size)
-    data = data_of(network, readings, shown)
+    data = learning_data(network.learns, readings, shown)
     return fit(lesson(network, n_hidden, trainer, data), network.n_restarts)

@@ -30,11 +30,6 @@ class Trained:
     network: perceptron.Network
 
     @property
-    def learns(self) -> str:
-        """Key of KINDS."""
-        return str(self.settings.learns)
-
-    @property
     def row(self) -> dict[str, NDArray]:
         """Columns (1,) of NETWORK and RESTART."""
         return {
