@@ -26,6 +26,10 @@ def random_joints(n, seed=0):
     return np.random.default_rng(seed).uniform(*LIMITS, (n, 6))
 
 
+def within_limits(arm, joints):
+    return ((joints >= arm.minimum) & (joints <= arm.maximum)).all(axis=-1)
+
+
 def section(data, machine=FILES["data/machines/fanuc.yaml"]):
     """The section of changed contents of params.yaml."""
     known = {"params.yaml": data, "data/machines/fanuc.yaml": machine}

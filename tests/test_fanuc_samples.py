@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pandas as pd
 import pytest
-from fanuc_arm import ARM, SECTION
+from fanuc_arm import ARM, SECTION, within_limits
 
 from flexik.cases.fanuc.parts import generate, samples
 from flexik.cases.fanuc.parts.samples import beside, random_joints, taught_path
@@ -36,7 +36,7 @@ def test_the_path_is_smooth_and_at_rest_at_its_ends():
 
 def test_the_path_of_params_yaml_keeps_away_from_trouble():
     joints = taught_path(ARM, PATH).joints
-    assert ARM.within_limits(joints).all()
+    assert within_limits(ARM, joints).all()
     assert len(np.unique(configuration(ARM, joints))) == 1
     assert np.linalg.svd(jacobian(ARM, joints), compute_uv=False)[:, -1].min() > 0.1
     # joints are a function of the position: the path does not meet itself
@@ -115,7 +115,7 @@ def test_random_joints_keep_limits_of_another_range():
         ARM, minimum=(-1.1, *ARM.minimum[1:]), maximum=(6.0, *ARM.maximum[1:])
     )
     numbers, joints = drawn(shifted, 200)
-    assert shifted.within_limits(joints).all() and joints[:, 0].max() > np.pi
+    assert within_limits(shifted, joints).all() and joints[:, 0].max() > np.pi
     assert np.array_equal(configuration(shifted, joints), numbers)
 
 
@@ -123,7 +123,7 @@ def test_random_joints_are_of_their_configuration_and_within_limits():
     numbers, joints = drawn(ARM, 300)
     assert np.array_equal(np.bincount(numbers), [300] * 8)
     assert np.array_equal(configuration(ARM, joints), numbers)
-    assert ARM.within_limits(joints).all()
+    assert within_limits(ARM, joints).all()
     assert np.array_equal(canonical(ARM, joints), joints)
     # the closed form reaches each within the limits, at the same joints
     found = inverse(ARM, forward(ARM, joints))

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import py_opw_kinematics as opw
 import pytest
-from fanuc_arm import ARM, LIMITS, random_joints
+from fanuc_arm import ARM, LIMITS, random_joints, within_limits
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import RigidTransform
@@ -63,10 +63,10 @@ def test_every_configuration_reaches_the_pose(trip):
 
 def test_limits_are_applied_to_every_configuration(trip):
     _, _, found = trip
-    assert ARM.within_limits(found.joints[found.reached]).all()
+    assert within_limits(ARM, found.joints[found.reached]).all()
     limited = found.status == ACTUATOR_LIMIT
     assert limited.any()
-    assert not ARM.within_limits(found.joints[limited]).any()
+    assert not within_limits(ARM, found.joints[limited]).any()
     assert np.isnan(found.joints[found.status == OUT_OF_REACH]).all()
     assert set(np.bincount(found.reached.sum(axis=1)).nonzero()[0]) <= {1, 2, 3, 4, 6, 8}
 
@@ -104,7 +104,7 @@ def test_canonical_joints_are_the_same_pose_and_configuration():
     # the elbow angle spans half a turn in each configuration
     elbow = (configuration(ARM, joints) & ELBOW) > 0
     assert np.ptp(found[elbow, 2]) < np.pi and np.ptp(found[~elbow, 2]) < np.pi
-    assert ARM.within_limits(found).all()
+    assert within_limits(ARM, found).all()
 
 
 def test_wrist_singularity_is_flagged_and_still_solved():
@@ -195,11 +195,11 @@ def test_joints_are_turned_to_where_their_limits_admit_them():
     low, high = np.array(shifted.minimum), np.array(shifted.maximum)
     drawn = np.random.default_rng(2).uniform(low, high, (500, 6))
     joints = canonical(shifted, drawn)
-    assert not shifted.within_limits(joints).all()
+    assert not within_limits(shifted, joints).all()
     turned = admissible(shifted, joints)
-    assert shifted.within_limits(turned).all()
+    assert within_limits(shifted, turned).all()
     assert np.abs(wrapped(turned - drawn)).max() < 1e-12
-    kept = shifted.within_limits(joints)
+    kept = within_limits(shifted, joints)
     assert np.array_equal(turned[kept], joints[kept])
     # joint 2 has no other turn
     beyond = np.array([[0.0, 3.0, 0.0, 1.0, 0.0, 0.0]])

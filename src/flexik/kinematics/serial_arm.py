@@ -4,14 +4,11 @@ Standard Denavit-Hartenberg convention: link i is a turn by theta_i = joint_i + 
 shift by d_i along z and by a_i along x, and a turn by alpha_i about x.
 """
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from flexik.errors import ParameterError
 
 Array = NDArray[np.float64]
 
@@ -31,29 +28,10 @@ class SerialArm:
     minimum: tuple[float, ...]
     maximum: tuple[float, ...]
 
-    def __post_init__(self) -> None:
-        lengths = {len(getattr(self, name)) for name in self.__dataclass_fields__}
-        if len(lengths) != 1:
-            raise ParameterError("expected as many limits and entries of every column as joints")
-        for number, (low, high) in enumerate(zip(self.minimum, self.maximum, strict=True), 1):
-            if not low < high:
-                raise ParameterError(f"joint {number}: limits must increase, got {low} to {high}")
-
-    @classmethod
-    def from_rows(cls, rows: Sequence[Mapping[str, float]]) -> Self:
-        """Arm of one mapping a joint, from the names of the attributes to numbers."""
-        columns = {name: tuple(row[name] for row in rows) for name in cls.__dataclass_fields__}
-        return cls(**columns)
-
     @property
     def n_joints(self) -> int:
         """Number of joints."""
         return len(self.d)
-
-    def within_limits(self, joints: Array) -> NDArray[np.bool_]:
-        """Whether all joints of each row of `joints` (n, n_joints), rad, lie in their limits."""
-        inside = (joints >= np.array(self.minimum)) & (joints <= np.array(self.maximum))
-        return np.all(inside, axis=-1)
 
 
 class Pose(NamedTuple):
@@ -72,6 +50,11 @@ class Frames(NamedTuple):
 
     origin: Array
     rotation: Array
+
+    @property
+    def end(self) -> Pose:
+        """Pose of the end effector, the last frame."""
+        return Pose(self.origin[:, -1], self.rotation[:, -1])
 
 
 def frames(arm: SerialArm, joints: Array) -> Frames:
@@ -97,8 +80,7 @@ def frames(arm: SerialArm, joints: Array) -> Frames:
 
 def forward(arm: SerialArm, joints: Array) -> Pose:
     """Pose of the end effector at `joints` (n, n_joints) in rad."""
-    found = frames(arm, joints)
-    return Pose(found.origin[:, -1], found.rotation[:, -1])
+    return frames(arm, joints).end
 
 
 def jacobian(arm: SerialArm, joints: Array) -> Array:
@@ -187,8 +169,7 @@ def refine(
     identity = np.eye(arm.n_joints)
     for _ in range(n_steps):
         found = frames(arm, joints)
-        achieved = Pose(found.origin[:, -1], found.rotation[:, -1])
-        shift, turn = pose_difference(target, achieved)
+        shift, turn = pose_difference(target, found.end)
         error = np.concatenate([shift, orientation_length * turn], axis=1)
         derivative = _jacobian(found)
         derivative[:, 3:] *= orientation_length

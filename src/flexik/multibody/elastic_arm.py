@@ -15,7 +15,7 @@ from exudyn import itemInterface as item
 from flexik.errors import SolverError
 from flexik.kinematics.elastic_arm import ArmGeometry
 from flexik.multibody.beams import Array, Beam, Elements, Section, discretise, nearest
-from flexik.multibody.elements import PlacedBeam, place_beam
+from flexik.multibody.elements import PlacedBeam, hang, place_beam, solved, static_settings, weigh
 
 # Newton's residual, N and N m: the last step falls far below it, onto the round-off floor
 NEWTON_TOLERANCE = 1e-6
@@ -161,13 +161,9 @@ class ArmModel:
         elbow = self.arm.geometry.lengths[0] * np.array([np.cos(first), np.sin(first)])
         self.links[0].move(np.zeros(2), float(first))
         self.links[1].move(elbow, float(second))
-        self._set_mass(self._payload, payload)
+        weigh(self.system, self._payload, payload, self.arm.gravity)
         self.system.AssembleInitializeSystemCoordinates()
-        try:
-            solved = exu.MainSolverStatic().SolveSystem(self.system, _SETTINGS)  # type: ignore[call-arg,misc]
-        except exu.SolverError:  # a singular matrix
-            solved = False
-        if not solved or not np.isfinite(self.system.systemData.GetODE2Coordinates()).all():
+        if not solved(self.system, _SETTINGS):
             degrees = ", ".join(f"{angle:.6g}" for angle in angles)
             raise SolverError(
                 f"no static equilibrium at angles ({degrees}) rad with {payload:g} kg"
@@ -182,8 +178,7 @@ class ArmModel:
             turned += self._angles[k]
             axis = np.array([np.cos(turned), np.sin(turned)])
             across = np.array([-axis[1], axis[0]])
-            end, rotation = link.nodes[-1], self._rotation(link.nodes[-1])
-            at_end = self._position(end) - base
+            rotation, at_end = link.rotation(-1), self._position(link.nodes[-1]) - base
             station = nearest(mesh.stations, arm.deflection_stations[k])
             at_station = self._position(link.nodes[station]) - base
             deformation += [
@@ -198,11 +193,6 @@ class ArmModel:
 
     def _position(self, node: int) -> Array:
         return np.array(self.system.GetNodeOutput(node, POSITION)[:2])
-
-    def _rotation(self, node: int) -> float:
-        """Angle of a node from x, rad."""
-        moved = self.system.GetNodeOutput(node, exu.OutputVariableType.Coordinates)[2]
-        return float(moved + self.system.GetNodeParameter(node, "referenceCoordinates")[2])
 
     def _strain(self, link: PlacedBeam, station: int) -> float:
         """Axial strain of the element that begins at a station, which is the same all along it.
@@ -233,24 +223,7 @@ class ArmModel:
     def _hang(self, node: int, mass: float) -> int:
         """Hang `mass` in kg on a node; returns the load."""
         marker = self.system.AddMarker({"markerType": "NodePosition", "nodeNumber": node})
-        load = self.system.AddLoad({"loadType": "ForceVector", "markerNumber": marker})
-        self._set_mass(load, mass)
-        return load
-
-    def _set_mass(self, load: int, mass: float) -> None:
-        force = [0.0, -mass * self.arm.gravity, 0.0]
-        self.system.SetLoadParameter(load, "loadVector", force)
+        return hang(self.system, marker, mass, self.arm.gravity)
 
 
-def _settings() -> exu.SimulationSettings:
-    settings = exu.SimulationSettings()
-    settings.solution.file.write = False
-    settings.staticSolver.verboseMode = 0
-    settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
-    settings.staticSolver.newton.absoluteTolerance = NEWTON_TOLERANCE
-    settings.staticSolver.newton.relativeTolerance = 0.0
-    settings.staticSolver.computeLoadsJacobian = False
-    return settings
-
-
-_SETTINGS = _settings()
+_SETTINGS = static_settings(NEWTON_TOLERANCE)

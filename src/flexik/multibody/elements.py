@@ -63,17 +63,17 @@ class PlacedBeam:
         """Hold a marker `by` (2,) in m, ground frame, off its place; the next shift replaces it."""
         node, ahead, offset = self._markers[marker]
         if by.any():
-            c, s = self._direction(node)
+            angle = self.rotation(node)
+            c, s = float(np.cos(angle)), float(np.sin(angle))
             ahead, offset = ahead + c * by[0] + s * by[1], offset - s * by[0] + c * by[1]
         self._set_position(marker, node, ahead, offset)
 
-    def _direction(self, node: int) -> tuple[float, float]:
-        """Cosine and sine of the rotation of a node in the current solution."""
+    def rotation(self, node: int) -> float:
+        """Angle of a node from x in the current solution, rad."""
         number = self.nodes[node]
         moved = self.system.GetNodeOutput(number, exu.OutputVariableType.Coordinates)
         turned = np.add(moved, self.system.GetNodeParameter(number, "referenceCoordinates"))[2:]
-        angle = np.arctan2(turned[1], turned[0]) if self.ancf else turned[0]
-        return float(np.cos(angle)), float(np.sin(angle))
+        return float(np.arctan2(turned[1], turned[0]) if self.ancf else turned[0])
 
     def _put(self, marker: int, node: int, ahead: float, offset: float) -> None:
         self._markers[marker] = (node, ahead, offset)
@@ -131,6 +131,40 @@ def place_beam(
     beam.reshape(elements)
     beam.move(origin, angle)
     return beam
+
+
+def hang(system: exu.MainSystem, marker: int, mass: float, gravity: float) -> int:
+    """Hang `mass` in kg on a marker; returns the load, whose mass `weigh` changes."""
+    load = system.AddLoad({"loadType": "ForceVector", "markerNumber": marker})
+    weigh(system, load, mass, gravity)
+    return load
+
+
+def weigh(system: exu.MainSystem, load: int, mass: float, gravity: float) -> None:
+    """Set a load to the weight of `mass` in kg."""
+    system.SetLoadParameter(load, "loadVector", [0.0, -mass * gravity, 0.0])
+
+
+def static_settings(tolerance: float) -> exu.SimulationSettings:
+    """Static equilibrium to the residual `tolerance` of Newton's method, N and N m."""
+    settings = exu.SimulationSettings()
+    settings.solution.file.write = False
+    settings.staticSolver.verboseMode = 0
+    settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
+    settings.staticSolver.newton.absoluteTolerance = tolerance
+    settings.staticSolver.newton.relativeTolerance = 0.0
+    # weights hardly stiffen a machine: their Jacobian only costs time
+    settings.staticSolver.computeLoadsJacobian = False
+    return settings
+
+
+def solved(system: exu.MainSystem, settings: exu.SimulationSettings) -> bool:
+    """Go from the present state to static equilibrium; whether there is one."""
+    try:
+        found = exu.MainSolverStatic().SolveSystem(system, settings)  # type: ignore[call-arg,misc]
+    except exu.SolverError:  # a singular matrix
+        return False
+    return bool(found) and bool(np.isfinite(system.systemData.GetODE2Coordinates()).all())
 
 
 def _references(ancf: bool, stations: Array, origin: Array, angle: float) -> list[list[float]]:

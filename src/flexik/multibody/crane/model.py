@@ -22,7 +22,7 @@ from flexik.kinematics.crane import (
 from flexik.machines.crane import Rod
 from flexik.multibody.beams import Array, Elements
 from flexik.multibody.crane.structure import SLIDING, FlexibleCrane, Meshes, beam_meshes
-from flexik.multibody.elements import place_beam
+from flexik.multibody.elements import hang, place_beam, solved, static_settings, weigh
 from flexik.parameters.model import Vector
 
 # Newton's residual, N and N m: it falls quadratically onto a round-off floor of about 1e-4 (stiff
@@ -201,18 +201,14 @@ class CraneModel:
         """Find the equilibrium with `payload` in kg, starting from the last solutions."""
         self._set_weight(self._payload_load, payload)
         self._predict(payload)
-        try:
-            solved = exu.MainSolverStatic().SolveSystem(self.system, _SETTINGS)  # type: ignore[call-arg,misc]
-        except exu.SolverError:  # a singular matrix
-            solved = False
-        data = self.system.systemData
-        solution = np.array(data.GetODE2Coordinates()), np.array(data.GetAECoordinates())
-        if not solved or not np.isfinite(solution[0]).all():
+        if not solved(self.system, _SETTINGS):
             self.system.AssembleInitializeSystemCoordinates()  # back to the unloaded pose
             self._solved = []
             raise SolverError(
                 f"no static equilibrium at strokes {listed(self.strokes)} m with {payload:g} kg"
             )
+        data = self.system.systemData
+        solution = np.array(data.GetODE2Coordinates()), np.array(data.GetAECoordinates())
         self._solved = [*self._solved[-1:], (payload, *solution)]
 
     def _predict(self, payload: float) -> None:
@@ -345,13 +341,10 @@ class CraneModel:
 
     def _add_weight(self, marker: int, mass: float) -> int:
         """Hang `mass` in kg on a marker; returns the load."""
-        load = self.system.AddLoad({"loadType": "ForceVector", "markerNumber": marker})
-        self._set_weight(load, mass)
-        return load
+        return hang(self.system, marker, mass, self.crane.structure.gravity)
 
     def _set_weight(self, load: int, mass: float) -> None:
-        force = [0.0, -mass * self.crane.structure.gravity, 0.0]
-        self.system.SetLoadParameter(load, "loadVector", force)
+        weigh(self.system, load, mass, self.crane.structure.gravity)
 
     def _reaction(self) -> Array:
         x, y, moment = (self._force(number) for number in self._supports)
@@ -367,15 +360,9 @@ class CraneModel:
 
 
 def _settings() -> exu.SimulationSettings:
-    settings = exu.SimulationSettings()
-    settings.solution.file.write = False
-    settings.staticSolver.verboseMode = 0
-    settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
-    settings.staticSolver.newton.absoluteTolerance = NEWTON_TOLERANCE
-    settings.staticSolver.newton.relativeTolerance = 0.0
+    settings = static_settings(NEWTON_TOLERANCE)
     settings.staticSolver.minimumStepSize = SMALLEST_LOAD_STEP
-    # weights hardly stiffen the crane, and its Jacobian hardly changes: both only cost time
-    settings.staticSolver.computeLoadsJacobian = False
+    # the Jacobian of the crane hardly changes
     settings.staticSolver.newton.useModifiedNewton = True
     return settings
 

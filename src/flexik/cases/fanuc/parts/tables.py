@@ -73,7 +73,8 @@ STUDY_FIELDS = (
 
 def arm_of(joints: Sequence[Joint]) -> SerialArm:
     """The arm of the machine file."""
-    return SerialArm.from_rows([joint.model_dump() for joint in joints])
+    columns = ((name, tuple(getattr(j, name) for j in joints)) for name in Joint.model_fields)
+    return SerialArm(**dict(columns))
 
 
 def named(fields: Sequence[Field], values: Array) -> dict[str, Array]:
