@@ -13,14 +13,11 @@ from flexik.evaluation.errors import (
     STATISTICS,
     TIP_ERRORS,
     check,
-    comparison,
     evaluate,
     fields_of,
     statistics,
-    statistics_without,
     tip_judge,
     workspace_statistics,
-    worst_points,
 )
 from flexik.kinematics.status import NOT_CONVERGED, REACHED
 from flexik.positioning.method import Answer, Columns, PositioningError
@@ -168,60 +165,6 @@ def test_workspace_statistics_by_hand():
     assert workspace_statistics(pair)["p95_error"] == pytest.approx(0.0095)
 
 
-def errors_of_points():
-    """Three points with two payloads; the largest errors are those of (4, 1), then of (3, 2)."""
-    errors = [0.001, 0.002, 0.009, 0.001, 0.004, 0.005]
-    return pd.DataFrame(
-        {
-            "target_x": [1.0, 1.0, 4.0, 4.0, 3.0, 3.0],
-            "target_y": [2.0, 2.0, 1.0, 1.0, 2.0, 2.0],
-            "error_x": errors,
-            "error_y": 0.0,
-            "error": errors,
-            "status": [0, 0, 0, NOT_CONVERGED, 0, 0],
-        }
-    )
-
-
-def test_worst_points_have_the_largest_errors_over_their_payloads():
-    frame = errors_of_points()
-    assert worst_points(frame).tolist() == [[4.0, 1.0], [3.0, 2.0]]
-    assert worst_points(frame, 1).tolist() == [[4.0, 1.0]]
-    assert worst_points(frame.sample(frac=1.0, random_state=1), 3).tolist() == [
-        *([4.0, 1.0], [3.0, 2.0], [1.0, 2.0])
-    ]
-    with pytest.raises(DataError, match="expected 4 target points or more, found 3"):
-        worst_points(frame, 4)
-
-
-def test_equal_errors_come_by_their_coordinates():
-    frame = errors_of_points().assign(error=0.001)
-    assert worst_points(frame).tolist() == [[1.0, 2.0], [3.0, 2.0]]
-
-
-def test_statistics_without_points_by_hand():
-    found = statistics_without(errors_of_points(), [[4.0, 1.0]])
-    assert found["max_error"] == 0.005
-    assert found["mean_error"] == pytest.approx(0.003)
-    assert (found["n_conditions"], found["n_failed"]) == (4, 0)
-
-
-def test_statistics_without_no_point_are_all_statistics():
-    frame = errors_of_points()
-    assert statistics_without(frame, np.empty((0, 2))) == statistics(frame)
-
-
-def test_points_that_cannot_be_left_out_are_told():
-    frame = errors_of_points()
-    # both coordinates are in the frame, not together
-    with pytest.raises(DataError, match=r"\(4, 2\)"):
-        statistics_without(frame, [[4.0, 1.0], [4.0, 2.0]])
-    with pytest.raises(PositioningError, match="points: expected shape"):
-        statistics_without(frame, [4.0, 1.0])
-    with pytest.raises(DataError, match="no error is left"):
-        statistics_without(frame, worst_points(frame, 3))
-
-
 def test_misfits_are_told():
     conditions, still = two_conditions(), tip_judge(lambda values, payload: values[:, :2])
     with pytest.raises(PositioningError, match="achieved tip: sample 1 is not finite"):
@@ -243,23 +186,3 @@ def test_published_errors_are_consistent():
         assert (r >= np.maximum(dx, dy)).all()
         assert (r <= dx + dy).all()
     assert published.loc["mean_error", "combined"] == 4.1405
-
-
-def test_comparison_in_millimetres_beside_the_published():
-    published = pd.read_csv(PUBLISHED)
-    ours = {name: 0.001 * k for k, name in enumerate(STATISTICS, start=1)}
-    table = comparison(
-        {"none": ours, "combined (genetic)": ours}, published, {"combined (genetic)": "combined"}
-    )
-    assert table.index.tolist() == list(STATISTICS)
-    assert table["none"].tolist() == pytest.approx([1, 2, 3, 4, 5, 6])
-    assert table.loc["max_error", "none published"] == 129.6755
-    assert table.loc["max_error", "combined (genetic) published"] == 9.2058
-    unpublished = comparison({"none": ours, "mine": ours}, published, {"mine": None})
-    assert unpublished["mine"].tolist() == pytest.approx([1, 2, 3, 4, 5, 6])
-    assert unpublished["mine published"].isna().all()
-    assert unpublished["none published"].equals(table["none published"])
-    with pytest.raises(DataError, match="no column 'other'"):
-        comparison({"other": ours}, published)
-    with pytest.raises(DataError, match="mean_error"):
-        comparison({"none": ours}, published.iloc[:5])

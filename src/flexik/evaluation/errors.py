@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from flexik.datasets.tables import Field
 from flexik.errors import DataError
@@ -155,76 +155,3 @@ def workspace_statistics(frame: pd.DataFrame) -> dict[str, float]:
         "n_targets": len(frame),
         "n_failed": int((frame["status"] != REACHED).sum()),
     }
-
-
-def statistics_without(frame: pd.DataFrame, points: ArrayLike) -> dict[str, float]:
-    """Return `statistics` of `frame` without all rows of the target `points` (k, 2) in m.
-
-    Raises DataError if a point is no target of the frame (exactly), or nothing is left.
-    """
-    left = np.ones(len(frame), dtype=bool)
-    for x, y in checked("points", points, None, 2):
-        of_point = ((frame["target_x"] == x) & (frame["target_y"] == y)).to_numpy()
-        if not of_point.any():
-            raise DataError(f"expected the target ({x:g}, {y:g}) m among the errors, found none")
-        left &= ~of_point
-    if not left.any():
-        raise DataError("no error is left without the points that are left out")
-    return statistics(frame[left])
-
-
-def worst_points(frame: pd.DataFrame, n: int = 2) -> Array:
-    """Coordinates (n, 2) in m of the targets with the largest errors, worst first.
-
-    The error of a target is the largest over its payloads; equal ones come by their coordinates.
-    Raises DataError if there are fewer targets.
-    """
-    largest = frame.groupby(["target_x", "target_y"])["error"].max()
-    if len(largest) < n:
-        raise DataError(f"expected {n} target points or more, found {len(largest)}")
-    return np.array(largest.nlargest(n).index.to_list(), dtype=float).reshape(n, 2)
-
-
-def comparison(
-    by_method: Mapping[str, Mapping[str, float]],
-    published: pd.DataFrame,
-    column_of: Mapping[str, str | None] | None = None,
-) -> pd.DataFrame:
-    """STATISTICS of methods beside the published ones, in mm.
-
-    Parameters
-    ----------
-    by_method
-        Results of `statistics` (m) by label.
-    published
-        A column `statistic` and a column (mm) for every published method.
-    column_of
-        Published column of a label where it is not the label itself, as for two variants of one
-        method; None where nothing is published.
-
-    Returns
-    -------
-    DataFrame
-        Rows STATISTICS; columns `label` and `label published`, NaN where nothing is published, for
-        every label.
-
-    Raises
-    ------
-    DataError
-        If a published statistic or column is missing.
-    """
-    table = published.set_index("statistic")
-    if missing := [name for name in STATISTICS if name not in table.index]:
-        raise DataError(f"published errors: expected the statistics {missing} too")
-    columns = {}
-    for label, values in by_method.items():
-        column = (column_of or {}).get(label, label)
-        if column is not None and column not in table.columns:
-            raise DataError(f"published errors: no column {column!r}, found {list(table.columns)}")
-        columns[label] = [1e3 * values[name] for name in STATISTICS]
-        columns[f"{label} published"] = (
-            [np.nan] * len(STATISTICS)
-            if column is None
-            else table.loc[list(STATISTICS), column].tolist()
-        )
-    return pd.DataFrame(columns, index=pd.Index(list(STATISTICS), name="statistic"))
