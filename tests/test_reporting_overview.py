@@ -41,18 +41,18 @@ def test_other_blocks_stay(first, second):
 
 
 @pytest.mark.parametrize(
-    ("text", "new", "message"),
+    ("text", "new"),
     [
-        ("nothing", "x", r"<!-- flexik:errors --> once, found it 0 times"),
-        ("<!-- flexik:errors -->", "x", r"<!-- /flexik:errors --> once, found it 0 times"),
-        (block("errors", "") * 2, "x", r"found it 2 times"),
-        ("<!-- /flexik:errors --> <!-- flexik:errors -->", "x", r"<!-- /flexik:errors --> after"),
-        (block("errors", ""), "<!-- /flexik:errors -->", r"holds the marker"),
-        (block("other", ""), "x", r"flexik:errors"),
+        ("nothing", "x"),
+        ("<!-- flexik:errors -->", "x"),
+        (block("errors", "") * 2, "x"),
+        ("<!-- /flexik:errors --> <!-- flexik:errors -->", "x"),
+        (block("errors", ""), "<!-- /flexik:errors -->"),
+        (block("other", ""), "x"),
     ],
 )
-def test_wrong_markers_are_named(text, new, message):
-    with pytest.raises(DataError, match=message):
+def test_wrong_markers_are_named(text, new):
+    with pytest.raises(DataError, match=r"<!-- flexik:errors --> and then <!-- /flexik:errors -->"):
         replace_block(text, "errors", new)
 
 

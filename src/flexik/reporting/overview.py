@@ -75,13 +75,9 @@ def replace_block(text: str, name: str, new: str) -> str:
     Raises DataError unless `text` has each marker once, in this order, and `new` has neither.
     """
     start, end = f"<!-- flexik:{name} -->", f"<!-- /flexik:{name} -->"
-    for marker in (start, end):
-        if (count := text.count(marker)) != 1:
-            raise DataError(f"expected the marker {marker} once, found it {count} times")
-        if marker in new:
-            raise DataError(f"the new text holds the marker {marker} itself")
-    before, rest = text.split(start)
-    if end not in rest:
-        raise DataError(f"expected the marker {end} after {start}")
+    before, _, rest = text.partition(start)
+    _, found, after = rest.partition(end)
+    if not found or start in new or end in new or text.count(start) * text.count(end) != 1:
+        raise DataError(f"expected {start} and then {end} in the text, once, and not in the new")
     # blank lines, or Markdown takes the text for part of the comment
-    return f"{before}{start}\n\n{new.strip(chr(10))}\n\n{end}{rest.split(end)[1]}"
+    return f"{before}{start}\n\n{new.strip(chr(10))}\n\n{end}{after}"

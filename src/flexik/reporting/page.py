@@ -6,6 +6,7 @@ In a template stand sentences with numbers by name; a paragraph may be wrapped. 
 """
 
 import re
+import traceback
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -111,22 +112,14 @@ def render(
     try:
         text = environment.get_template(path.name).render(**values)
     except jinja2.TemplateError as error:
-        line = getattr(error, "lineno", None) or _line(error, path.name)
-        raise DataError(f"{path}{f', line {line}' if line else ''}: {error}") from error
+        # of the page or of what it includes
+        frames = reversed(traceback.extract_tb(error.__traceback__))
+        places = [f"{f.filename}, line {f.lineno}" for f in frames if f.filename.endswith(".j2")]
+        raise DataError(f"{[*places, path][0]}: {error}") from error
     page.text = re.sub(r"\n{3,}", "\n\n", unwrapped(text)).strip("\n") + "\n"
     if left := sorted((set(tables) - set(page.tables)) | (known - set(page.figures))):
         raise DataError(f"{path}: nowhere shows {', '.join(left)}")
     return page
-
-
-def _line(error: Exception, name: str) -> int | None:
-    """Line of the template `name` where an error was raised."""
-    trace, line = error.__traceback__, None
-    while trace is not None:
-        if Path(trace.tb_frame.f_code.co_filename).name == name:
-            line = trace.tb_lineno
-        trace = trace.tb_next
-    return line
 
 
 def unwrapped(text: str) -> str:

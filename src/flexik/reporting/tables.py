@@ -36,12 +36,37 @@ class Table:
     @property
     def csv(self) -> str:
         """Text of the CSV file."""
-        cells = _cells(self.frame, self.decimals, EXTRA_DECIMALS)
-        return cells.to_csv(index=False, lineterminator="\n")
+        return self._cells(EXTRA_DECIMALS).to_csv(index=False, lineterminator="\n")
 
     def markdown(self, caption: str = "", notes: Sequence[str] = ()) -> str:
-        """Caption, rows, notes as a list; see `markdown`."""
-        return markdown(self.frame, self.decimals, caption, notes)
+        r"""Caption, rows with numbers to the right, notes as a list, in GitHub's Markdown.
+
+        Empty cells stand for None and NaN; `|` is escaped. Raises DataError if `decimals` names a
+        column that is not there, or a number is infinite.
+        """
+        cells = self._cells(0)
+        columns = [[str(name), *cells.iloc[:, k]] for k, name in enumerate(cells)]
+        columns = [[t.replace("|", r"\|").replace("\n", " ") for t in texts] for texts in columns]
+        lines = []
+        for k, texts in enumerate(columns):
+            width, right = max(3, *map(len, texts)), _is_numeric(self.frame.iloc[:, k])
+            texts = [text.rjust(width) if right else text.ljust(width) for text in texts]
+            lines.append([texts[0], "-" * (width - 1) + (":" if right else "-"), *texts[1:]])
+        rows = [f"| {' | '.join(row)} |" for row in zip(*lines, strict=True)]
+        blocks = [caption, "\n".join(rows), "\n".join(f"- {note}" for note in notes)]
+        return "\n\n".join(filter(None, blocks)) + "\n"
+
+    def _cells(self, extra: int) -> pd.DataFrame:
+        """All cells as text."""
+        places = self.decimals
+        if isinstance(places, Mapping):
+            require("columns of the table", self.frame.columns, places)
+        columns = []
+        for k, name in enumerate(self.frame.columns):
+            n = extra + (places if isinstance(places, int) else places.get(name, DECIMALS))
+            columns.append([_text(value, n, name) for value in self.frame.iloc[:, k].tolist()])
+        rows = list(zip(*columns, strict=True))
+        return pd.DataFrame(rows, columns=self.frame.columns, dtype=object)
 
 
 @dataclass(frozen=True)
@@ -66,7 +91,7 @@ def table(rows: pd.DataFrame | Sequence[Mapping], columns: Mapping[str, Any]) ->
     frame = pd.DataFrame(rows)
     given = {t: c if isinstance(c, Column) else Column(c) for t, c in columns.items()}
     if frame.empty:
-        return Table(pd.DataFrame(columns=list(given)), {t: c.decimals for t, c in given.items()})
+        frame = pd.DataFrame(columns=[c.source for c in given.values()])
     require("rows of the table", frame.columns, [column.source for column in given.values()])
     found = {
         title: frame[c.source] if c.scale == 1.0 else c.scale * frame[c.source]
@@ -80,77 +105,23 @@ def write_table(
     frame: pd.DataFrame,
     decimals: Decimals = DECIMALS,
     caption: str = "",
-    footnotes: Sequence[str] = (),
+    notes: Sequence[str] = (),
 ) -> None:
-    """Write `frame` without its index to `.csv` and `.md`, each whole or not at all.
-
-    Parameters
-    ----------
-    path_without_suffix
-        Where; `.csv` and `.md` are appended.
-    frame
-        Rows of numbers, texts or nothing; integers are written as such.
-    decimals
-        Of floats in Markdown, for all columns or by column (DECIMALS for the others).
-    caption, footnotes
-        See `markdown`.
-
-    Raises
-    ------
-    DataError
-        If `decimals` names a column that `frame` lacks, or a number is infinite.
-    """
-    text = markdown(frame, decimals, caption, footnotes)
-    cells = _cells(frame, decimals, EXTRA_DECIMALS)
-    path = Path(path_without_suffix)
-    write_text(path.with_name(path.name + ".csv"), cells.to_csv(index=False, lineterminator="\n"))
-    write_text(path.with_name(path.name + ".md"), text)
+    """Write a Table to `.csv` and `.md`, which are appended, each whole or not at all."""
+    made = Table(frame, decimals)
+    csv, text = made.csv, made.markdown(caption, notes)
+    write_text(f"{path_without_suffix}.csv", csv)
+    write_text(f"{path_without_suffix}.md", text)
 
 
 def markdown(
     frame: pd.DataFrame,
     decimals: Decimals = DECIMALS,
     caption: str = "",
-    footnotes: Sequence[str] = (),
+    notes: Sequence[str] = (),
 ) -> str:
-    r"""Table in GitHub's Markdown: caption, rows with numbers to the right, footnotes as a list.
-
-    Empty cells stand for None and NaN; `|` is escaped. Raises DataError as `write_table` does.
-    """
-    cells = _cells(frame, decimals, 0)
-    header = [_escaped(str(name)) for name in cells.columns]
-    rows = [[_escaped(text) for text in row] for row in cells.itertuples(index=False, name=None)]
-    to_right = [_is_numeric(frame.iloc[:, k]) for k in range(frame.shape[1])]
-    widths = [max(3, *(len(row[k]) for row in [header, *rows])) for k in range(len(header))]
-
-    def line(row: Sequence[str]) -> str:
-        padded = (
-            text.rjust(width) if right else text.ljust(width)
-            for text, width, right in zip(row, widths, to_right, strict=True)
-        )
-        return "| " + " | ".join(padded) + " |"
-
-    rule = [
-        "-" * (width - 1) + (":" if right else "-")
-        for width, right in zip(widths, to_right, strict=True)
-    ]
-    blocks = [caption] if caption else []
-    blocks.append("\n".join([line(header), line(rule), *map(line, rows)]))
-    if footnotes:
-        blocks.append("\n".join(f"- {note}" for note in footnotes))
-    return "\n\n".join(blocks) + "\n"
-
-
-def _cells(frame: pd.DataFrame, decimals: Decimals, extra: int) -> pd.DataFrame:
-    """All cells as text."""
-    if isinstance(decimals, Mapping):
-        require("columns of the table", frame.columns, decimals)
-    columns = []
-    for k, name in enumerate(frame.columns):
-        places = decimals if isinstance(decimals, int) else decimals.get(name, DECIMALS)
-        columns.append([_text(value, places + extra, name) for value in frame.iloc[:, k].tolist()])
-    rows = list(zip(*columns, strict=True))
-    return pd.DataFrame(rows, columns=frame.columns, dtype=object)
+    """Markdown of a Table."""
+    return Table(frame, decimals).markdown(caption, notes)
 
 
 def _text(value: object, places: int, column: object) -> str:
@@ -172,7 +143,3 @@ def _is_numeric(column: pd.Series) -> bool:
     return bool(values) and all(
         isinstance(v, numbers.Real) and not isinstance(v, bool) for v in values
     )
-
-
-def _escaped(text: str) -> str:
-    return text.replace("|", r"\|").replace("\n", " ")
