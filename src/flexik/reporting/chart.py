@@ -5,7 +5,7 @@ A chart is a list of layers over tidy frames; a column names the panel of a row,
 
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -126,7 +126,10 @@ def chart(
     """
     for layer in layers:
         _check(layer)
-    names = [None] if panel is None else list(panels or _values(layers, panel))
+    names: list[Any] = [None]
+    if panel is not None:
+        seen = (v for layer in layers if panel in layer.frame for v in layer.frame[panel])
+        names = list(panels or dict.fromkeys(seen))
     columns = min(columns, len(names))
     rows = -(-len(names) // columns)
     height = height or 1.1 + (4.0 if len(names) == 1 else 2.5) * rows
@@ -138,7 +141,10 @@ def chart(
     hues = {value: None for layer in layers if layer.hue for value in layer.frame[layer.hue]}
     looks = {**style.looks(hues), **(looks or {})}
     for axes, name in zip(grid.ravel(), names, strict=False):
-        _panel(axes, layers, panel, name, (x, y), looks)
+        inside = [(layer, _inside(layer, panel, name)) for layer in layers]
+        at_x, at_y = (_for_panel(a, name, inside, k) for a, k in ((x, "x"), (y, "y")))
+        for layer, frame in inside:
+            _draw(axes, layer, frame, at_x, at_y, looks)
         for rule in rules:
             if rule.panel in (None, name):
                 line = axes.axvline if rule.axis == "x" else axes.axhline
@@ -161,62 +167,44 @@ def _check(layer: Layer) -> None:
         raise DataError(f"{what}: expected finite numbers")
 
 
-def _values(layers: Iterable[Layer], column: str) -> list[Any]:
-    frames = (layer.frame for layer in layers if column in layer.frame)
-    return list(dict.fromkeys(value for frame in frames for value in frame[column]))
-
-
 def _inside(layer: Layer, panel: str | None, name: Any) -> pd.DataFrame:
     everywhere = panel is None or panel not in layer.frame
     return layer.frame if everywhere else layer.frame[layer.frame[panel] == name]
 
 
-def _panel(
-    axes: Axes,
-    layers: Sequence[Layer],
-    panel: str | None,
+def _for_panel(
+    given: Axis | Mapping[Any, Axis],
     name: Any,
-    both: Sequence[Axis | Mapping[Any, Axis]],
-    looks: Mapping[Any, Look],
-) -> None:
-    """Draw what is in the panel `name`."""
-    inside = [(layer, _inside(layer, panel, name)) for layer in layers]
-    # one axis of all panels begins where all of their data does
-    every = [(layer, layer.frame) for layer in layers]
-    seen = [every if isinstance(a, Axis) else inside for a in both]
-    least = [_least(drawn, which) for drawn, which in zip(seen, "xy", strict=True)]
-    axes_of = [a if isinstance(a, Axis) else a[name] for a in both]
-    for layer, frame in inside:
-        _draw(axes, layer, frame, axes_of, least, looks)
-
-
-def _least(drawn: Iterable[tuple[Layer, pd.DataFrame]], which: str) -> float:
-    """Least value drawn on a logarithmic axis without one of its own, in the unit of the column."""
+    inside: Iterable[tuple[Layer, pd.DataFrame]],
+    which: str,
+) -> Axis:
+    """Axis of the panel `name` with the least value that it shows, if it is logarithmic."""
+    axis = given if isinstance(given, Axis) else given[name]
+    if not axis.log or axis.least is not None:
+        return axis
     numbers = [
-        rows[name].to_numpy(dtype=float)
-        for layer, rows in drawn
-        for name in ([layer.x] if which == "x" else filter(None, (layer.y, layer.to)))
+        # one axis of all panels begins where all of their data does
+        (layer.frame if axis is given else rows)[column].to_numpy(dtype=float)
+        for layer, rows in inside
+        for column in ([layer.x] if which == "x" else filter(None, (layer.y, layer.to)))
     ]
     values = np.concatenate(numbers)
     positive = values[np.isfinite(values) & (values > 0)]
-    if not positive.size:
-        return 1.0
-    return max(float(positive.min()) / 1.3, float(positive.max()) / SPAN)
+    least = max(positive.min() / 1.3, positive.max() / SPAN) if positive.size else 1.0
+    return replace(axis, least=axis.scale * float(least))
 
 
-def _place(values: pd.Series, axis: Axis, least: float) -> Array:
+def _place(values: pd.Series, axis: Axis) -> Array:
     numbers = axis.scale * values.to_numpy(dtype=float)
-    if axis.least is not None or axis.log:
-        numbers = np.maximum(numbers, axis.scale * least if axis.least is None else axis.least)
-    return numbers
+    return numbers if axis.least is None else np.maximum(numbers, axis.least)
 
 
 def _draw(
     axes: Axes,
     layer: Layer,
     frame: pd.DataFrame,
-    axes_of: Sequence[Axis],
-    least: Sequence[float],
+    x: Axis,
+    y: Axis,
     looks: Mapping[Any, Look],
 ) -> None:
     if frame.empty:
@@ -228,11 +216,11 @@ def _draw(
         label = layer.label
         if layer.hue:
             label = str(hue) if label is None else label.format(hue)
-        columns = (layer.x, 0), (layer.y, 1), (layer.to or layer.y, 1)
-        at_x, at_y, to = (_place(rows[name], axes_of[k], least[k]) for name, k in columns)
+        at_x, at_y = _place(rows[layer.x], x), _place(rows[layer.y], y)
         if layer.mark == "text":
             _write(axes, at_x, at_y, rows, layer)
         elif layer.mark in ("band", "bars", "area"):
+            to = _place(rows[layer.to or layer.y], y)
             _fill(axes, (at_x, at_y, to), layer, {"color": look["color"], **layer.look}, label)
         else:
             axes.plot(at_x, at_y, label=label or None, **_line(layer, look))

@@ -94,10 +94,9 @@ def beside(
             texts = rows.assign(text=[format(v, numbers) for v in rows["at"]], dy=dy)
             look = {"color": colour}
             layers.append(Layer(texts, "at", "place", "text", text="text", look=look))
-        wide = {
-            k: replace(a, margin=0.12) for k, a in ({0: x} if isinstance(x, Axis) else x).items()
-        }
-        x = wide[0] if isinstance(x, Axis) else wide
+        given = {None: x} if isinstance(x, Axis) else x
+        wide = {name: replace(axis, margin=0.12) for name, axis in given.items()}
+        x = wide.get(None, wide)
     ticks = {k: (names or {}).get(c, str(c)) for c, k in categories.items()}
     y = Axis(ticks=ticks, limits=(len(ticks) - 0.45, -0.55))
     defaults: dict[str, Any] = {"share": "y"}
