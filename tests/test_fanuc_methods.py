@@ -7,7 +7,7 @@ import pytest
 from fanuc_arm import ARM, SECTION, random_joints
 
 from flexik.cases.fanuc.parts import evaluate, study, train
-from flexik.cases.fanuc.parts.learning import Run, TaughtSamples, learn, percent, side_by_side
+from flexik.cases.fanuc.parts.learning import TaughtSamples, learn, percent, side_by_side
 from flexik.cases.fanuc.parts.tables import (
     COMMANDED_FIELDS,
     JOINT_FIELDS,
@@ -177,13 +177,13 @@ def path(samples, tmp_path):
     return tmp_path / "path.parquet"
 
 
-def run(joints, settings, restart=0):
-    return Run(joints, Architecture(5, "logistic"), settings, 1, restart)
+def attempt(samples, joints, settings, n_hidden=5, restart=0):
+    return samples.attempt(joints, Architecture(n_hidden, "logistic"), settings, 1, restart)
 
 
 def test_a_training_gives_the_errors_of_every_joint(samples):
     settings = LevenbergMarquardtAccelerated(n_iterations=15)
-    (found,) = learn(samples, [run((2, 5), settings)])
+    (found,) = learn(samples, [attempt(samples, (2, 5), settings)])
     assert found.curves.shape == (2, len(found.record.errors), 2)
     residuals = found.network.predict(samples.test_positions) - samples.test_joints[:, [1, 4]]
     rms = np.sqrt(np.mean(residuals**2, axis=0)) / samples.ranges[[1, 4]]
@@ -192,7 +192,7 @@ def test_a_training_gives_the_errors_of_every_joint(samples):
 
 def test_networks_are_joined_into_one_that_gives_all_their_outputs(samples):
     settings = LevenbergMarquardtAccelerated(n_iterations=3)
-    learnt = learn(samples, [run((joint,), settings) for joint in (1, 2, 3)])
+    learnt = learn(samples, [attempt(samples, (joint,), settings) for joint in (1, 2, 3)])
     joined = side_by_side([each.network for each in learnt])
     expected = np.hstack([each.network.predict(samples.positions) for each in learnt])
     assert joined.predict(samples.positions) == pytest.approx(expected, abs=1e-14)
@@ -203,7 +203,8 @@ def test_the_generalised_delta_rule_learns_the_path(samples):
     """With the settings of params.yaml a pass is kept whatever its error, until it is infinite."""
     rule = SECTION.trainers["delta_rule"].but(n_iterations=150)
     faster = [rule.but(learning_rate=rate, minimum_rate=rate) for rate in (0.4, 1e9)]
-    rule, fast, beyond = learn(samples, [run((6,), each) for each in (rule, *faster)])
+    attempts = [attempt(samples, (6,), each) for each in (rule, *faster)]
+    rule, fast, beyond = learn(samples, attempts)
     assert rule.curves[0, rule.record.kept] < 0.2 * rule.curves[0, 0]
     assert rule.record.kept == int(np.argmin(rule.record.errors))
     assert str(fast.record.stop_reason) == "iterations"
@@ -243,7 +244,7 @@ def test_starts_that_learn_together_become_what_they_are_alone(path):
     work = train.prepare_path(**settings, trainer=rule, n_restarts=2, path=path)
     (item,) = work.items
     together = train.train_starts(item)
-    alone = train.train_starts(dataclasses.replace(item, runs=item.runs[1:]))
+    alone = train.train_starts(dataclasses.replace(item, attempts=item.attempts[1:]))
     for name, values in alone.items():
         assert np.array_equal(together[name], values), name
 
@@ -262,7 +263,7 @@ def test_a_study_tells_errors_of_every_value_and_start(samples, path):
     # the size and the factor of the others stand in both
     assert np.array_equal(sizes["error_percent"][2:], factors["error_percent"][:2])
     assert factors["error_percent"][0] != factors["error_percent"][2]
-    (found,) = learn(samples, [Run((2,), Architecture((4,), "logistic"), rule, 1, 1)])
+    (found,) = learn(samples, [attempt(samples, (2,), rule, n_hidden=4, restart=1)])
     for inputs, joints, name in (
         (samples.positions, samples.joints, "training_percent"),
         (samples.test_positions, samples.test_joints, "error_percent"),

@@ -1,8 +1,8 @@
 """How networks of the taught path learn: many at once where the trainer allows it."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Self
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
 
 import numpy as np
 import pandas as pd
@@ -20,6 +20,8 @@ from flexik.learning.training import (
     no_network,
 )
 from flexik.parameters.trainers import Stopping
+
+JOINT_NAMES = [field.name for field in JOINT_FIELDS]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,75 +49,71 @@ class TaughtSamples:
         """Range of each joint along the path (6,), rad: what errors are told in shares of."""
         return np.ptp(np.concatenate([self.joints, self.test_joints]), axis=0)
 
+    def attempt(
+        self,
+        joints: Sequence[int],
+        architecture: Architecture,
+        settings: Stopping,
+        seed: int,
+        restart: int,
+    ) -> Attempt:
+        """One start of a network that gives `joints`, numbers from 1."""
+        columns = [joint - 1 for joint in joints]
+        lesson = Lesson(
+            self.positions,
+            self.joints[:, columns],
+            quantities(POSITION_FIELDS),
+            quantities([JOINT_FIELDS[column] for column in columns]),
+            architecture,
+            settings,
+            seed,
+        )
+        return Attempt(lesson, restart)
 
-@dataclass(frozen=True, eq=False)
-class Run:
-    """One network: which joints (numbers from 1) it gives, and how it learns.
-
-    restart : tells starts of the same seed apart
-    """
-
-    joints: tuple[int, ...]
-    architecture: Architecture
-    settings: Stopping
-    seed: int
-    restart: int
-
-    @property
-    def columns(self) -> list[int]:
-        """Columns of the joints."""
-        return [joint - 1 for joint in self.joints]
+    def errors(self, network: Network, measure: Callable[[Array, Array, Array], Array]) -> Array:
+        """`measure` of the joints of `network` on training and on test samples, (2, joints)."""
+        columns = [JOINT_NAMES.index(quantity.name) for quantity in network.outputs]
+        pairs = (self.positions, self.joints), (self.test_positions, self.test_joints)
+        ranges = self.ranges[columns]
+        return np.array([measure(network.predict(x), y[:, columns], ranges) for x, y in pairs])
 
 
-@dataclass(frozen=True, eq=False)
-class Learnt:
-    """What a run gave.
+def percent(found: Array, expected: Array, ranges: Array) -> Array:
+    """Total error: mean absolute difference of columns (n, k) over `ranges` (k,), times 100."""
+    return 100.0 * np.abs(found - expected).mean(axis=0) / ranges
 
-    curves : (2, passes + 1, joints), root mean square errors on training and test samples over the
-        range of the joint
-    """
+
+def root_mean_square(found: Array, expected: Array, ranges: Array) -> Array:
+    """Root mean square difference of columns (n, k) over `ranges` (k,)."""
+    return np.sqrt(np.mean((found - expected) ** 2, axis=0)) / ranges
+
+
+class Learnt(NamedTuple):
+    """A network and, pass by pass, its root mean square errors `curves` (2, passes + 1, joints)."""
 
     network: Network
     record: TrainingRecord
     curves: Array
 
 
-def learn(samples: TaughtSamples, runs: Sequence[Run]) -> list[Learnt]:
-    """Train the networks of `runs`, of one architecture and kind of trainer.
+def learn(samples: TaughtSamples, attempts: Sequence[Attempt]) -> list[Learnt]:
+    """Train networks of one architecture and kind of trainer, with `TaughtSamples.errors`.
 
     Raises TrainingError if one comes to nothing.
     """
-    curves: list[list[Array]] = [[] for _ in runs]
+    curves: list[list[Array]] = [[] for _ in attempts]
 
-    def attempt(k: int) -> Attempt:
-        run = runs[k]
-        lesson = Lesson(
-            samples.positions,
-            samples.joints[:, run.columns],
-            quantities(POSITION_FIELDS),
-            quantities([JOINT_FIELDS[column] for column in run.columns]),
-            run.architecture,
-            run.settings,
-            run.seed,
-        )
-        observe = lambda network: curves[k].append(_errors(network, samples, run.columns))  # noqa: E731
-        return Attempt(lesson, run.restart, observe)
+    def observed(k: int) -> Attempt:
+        see = lambda network: curves[k].append(samples.errors(network, root_mean_square))  # noqa: E731
+        return replace(attempts[k], observer=see)
 
-    attempts = [attempt(k) for k in range(len(runs))]
-    found = attempt_together(attempts)
+    found = attempt_together([observed(k) for k in range(len(attempts))])
     learnt = []
-    for k, (network, record) in enumerate(found):
+    for made, (network, record), errors in zip(attempts, found, curves, strict=True):
         if network is None:
-            raise no_network(attempts[k].lesson, [record])
-        learnt.append(Learnt(network, record, np.stack(curves[k], axis=1)))
+            raise no_network(made.lesson, [record])
+        learnt.append(Learnt(network, record, np.stack(errors, axis=1)))
     return learnt
-
-
-def _errors(network: Network, samples: TaughtSamples, columns: list[int]) -> Array:
-    pairs = (samples.positions, samples.joints), (samples.test_positions, samples.test_joints)
-    errors = (network.predict(inputs) - outputs[:, columns] for inputs, outputs in pairs)
-    ranges = samples.ranges[columns]
-    return np.array([np.sqrt(np.mean(error**2, axis=0)) / ranges for error in errors])
 
 
 def side_by_side(networks: Sequence[Network]) -> Network:
@@ -135,8 +133,3 @@ def side_by_side(networks: Sequence[Network]) -> Network:
     outputs = tuple(quantity for each in networks for quantity in each.outputs)
     where = first.input_normalisation, normalisation, first.inputs, outputs
     return Network((hidden, output), first.activation, *where)
-
-
-def percent(found: Array, expected: Array, ranges: Array) -> Array:
-    """Total error: mean absolute difference of columns (n, k) over `ranges` (k,), times 100."""
-    return 100.0 * np.abs(found - expected).mean(axis=0) / ranges

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from flexik.cases.fanuc.parts.learning import Run, TaughtSamples, learn, percent
+from flexik.cases.fanuc.parts.learning import TaughtSamples, learn, percent
 from flexik.cases.fanuc.parts.tables import PATH_FIELDS, STUDY_FIELDS
 from flexik.cases.fanuc.section import Section
 from flexik.datasets.parts import Columns, Part, Work, rows
 from flexik.datasets.tables import read_table
-from flexik.learning.training import Architecture
+from flexik.learning.training import Architecture, Attempt
 from flexik.parameters.trainers import BackPropagation
 
 
@@ -36,11 +36,11 @@ def parts(section: Section) -> list[Part]:
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """Runs of one shape, and the value of each."""
+    """Starts of one shape, and the value of each."""
 
     samples: TaughtSamples
     values: list[float]
-    runs: list[Run]
+    attempts: list[Attempt]
 
 
 def prepare(
@@ -68,27 +68,20 @@ def prepare(
         item = by_size.setdefault(size, Item(samples, [], []))
         for restart in range(n_restarts):
             item.values.append(float(value))
-            item.runs.append(Run((joint,), Architecture(size, activation), settings, seed, restart))
+            architecture = Architecture(size, activation)
+            attempt = samples.attempt((joint,), architecture, settings, seed, restart)
+            item.attempts.append(attempt)
     return Work(errors_of, list(by_size.values()), rows(*STUDY_FIELDS))
 
 
 def errors_of(item: Item) -> Columns:
     """Columns STUDY_FIELDS."""
-    learnt, samples = learn(item.samples, item.runs), item.samples
-    column = item.runs[0].columns
-    pairs = (samples.positions, samples.joints), (samples.test_positions, samples.test_joints)
-    training, test = (
-        [
-            percent(each.network.predict(inputs), joints[:, column], samples.ranges[column])[0]
-            for each in learnt
-        ]
-        for inputs, joints in pairs
-    )
+    learnt = learn(item.samples, item.attempts)
+    errors = np.array([item.samples.errors(each.network, percent)[:, 0] for each in learnt])
     columns = (
         item.values,
-        [run.restart for run in item.runs],
-        training,
-        test,
+        [attempt.restart for attempt in item.attempts],
+        *errors.T,
         [each.record.kept for each in learnt],
         [str(each.record.stop_reason) for each in learnt],
     )

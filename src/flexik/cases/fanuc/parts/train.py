@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from flexik.cases.fanuc.parts.learning import Run, TaughtSamples, learn, percent, side_by_side
+from flexik.cases.fanuc.parts.learning import TaughtSamples, learn, percent, side_by_side
 from flexik.cases.fanuc.parts.tables import (
     CONFIGURATION,
     CURVE_FIELDS,
@@ -27,7 +27,7 @@ from flexik.kinematics.spherical_wrist import canonical
 from flexik.learning.perceptron import Network, Quantity
 from flexik.learning.stopping import StopReason
 from flexik.learning.storage import network_file, packed, unpacked
-from flexik.learning.training import Architecture, Lesson, TrainingRecord, train
+from flexik.learning.training import Architecture, Attempt, Lesson, TrainingRecord, train
 from flexik.parameters.trainers import BackPropagation, Stopping
 
 ALL_JOINTS = tuple(range(1, 7))
@@ -57,7 +57,7 @@ class Item:
 
     samples: TaughtSamples
     n_groups: int
-    runs: list[Run]
+    attempts: list[Attempt]
 
 
 def prepare_path(
@@ -76,13 +76,12 @@ def prepare_path(
     """
     samples = TaughtSamples.of_table(read_table(path, PATH_FIELDS))
     groups = [ALL_JOINTS] if learns == "all_joints" else [(joint,) for joint in ALL_JOINTS]
-    runs = [
-        Run(joints, architecture, trainer, seed, start * len(groups) + k)
-        for start in range(n_restarts)
-        for k, joints in enumerate(groups)
+    attempts = [
+        samples.attempt(joints, architecture, trainer, seed, number)
+        for number, joints in enumerate(groups * n_restarts)
     ]
-    n = len(runs) if isinstance(trainer, BackPropagation) else len(groups)
-    items = [Item(samples, len(groups), runs[k : k + n]) for k in range(0, len(runs), n)]
+    n = len(attempts) if isinstance(trainer, BackPropagation) else len(groups)
+    items = [Item(samples, len(groups), attempts[k : k + n]) for k in range(0, len(attempts), n)]
     return Work(train_starts, items, lambda results: _files(samples, results))
 
 
@@ -91,27 +90,28 @@ def train_starts(item: Item) -> Columns:
 
     Where a network took fewer passes than another of its start, its curve ends with nan.
     """
-    learnt, n, found = learn(item.samples, item.runs), item.n_groups, dict[str, np.ndarray]()
+    learnt, n, found = learn(item.samples, item.attempts), item.n_groups, dict[str, np.ndarray]()
     for first in range(0, len(learnt), n):
-        of_start, start = learnt[first : first + n], item.runs[first].restart // n
-        n_passes = max(each.curves.shape[1] for each in of_start)
-        curves = [
-            np.pad(
-                e.curves,
-                ((0, 0), (0, n_passes - e.curves.shape[1]), (0, 0)),
-                constant_values=np.nan,
-            )
-            for e in of_start
-        ]
-        joined = side_by_side([each.network for each in of_start])
-        record = joined_record([each.record for each in of_start], start)
-        kept = [each.record.kept for each in of_start for _ in each.network.outputs]
+        start = item.attempts[first].restart // n
+        networks, records, curves = zip(*learnt[first : first + n], strict=True)
+        joined = side_by_side(networks)
+        n_joints = [len(network.outputs) for network in networks]
         found |= {
-            f"network_{start}": packed(joined, record)["json"],
-            f"kept_{start}": np.array(kept),
-            f"curves_{start}": np.concatenate(curves, axis=2),
+            f"network_{start}": packed(joined, joined_record(records, start))["json"],
+            f"kept_{start}": np.repeat([record.kept for record in records], n_joints),
+            f"curves_{start}": np.concatenate(_padded(curves, axis=1), axis=2),
         }
     return found
+
+
+def _padded(arrays: Sequence[Array], axis: int) -> list[Array]:
+    """The arrays, those shorter along `axis` ending with nan."""
+    n, padded = max(each.shape[axis] for each in arrays), []
+    for each in arrays:
+        width = [(0, 0)] * each.ndim
+        width[axis] = (0, n - each.shape[axis])
+        padded.append(np.pad(each, width, constant_values=np.nan))
+    return padded
 
 
 def joined_record(records: Sequence[TrainingRecord], start: int) -> TrainingRecord:
@@ -120,10 +120,8 @@ def joined_record(records: Sequence[TrainingRecord], start: int) -> TrainingReco
     Errors are means over those that still learn, the pass kept is the last one that one of them
     keeps, the reason to stop that of the first that did not use all passes.
     """
-    n = max(len(record.errors) for record in records)
-    errors = [np.pad(r.errors, (0, n - len(r.errors)), constant_values=np.nan) for r in records]
-    reasons: list[StopReason] = [r.stop_reason for r in records]
-    early = (reason for reason in reasons if reason != StopReason.ITERATIONS)
+    errors = _padded([np.array(record.errors) for record in records], axis=0)
+    early = (r.stop_reason for r in records if r.stop_reason != StopReason.ITERATIONS)
     return replace(
         records[0],
         restart=start,
@@ -139,12 +137,11 @@ def _files(samples: TaughtSamples, results: list[Columns]) -> Mapping[str, Write
     for start in range(len(found) // 3):
         network, record = trained({"json": found[f"network_{start}"]})
         pairs.append((network, record))
-        columns = network.predict(samples.test_positions), samples.test_joints, samples.ranges
         starts.append(
             {
                 "restart": np.full(N_JOINTS, start),
                 "joint": np.array(ALL_JOINTS),
-                "error_percent": percent(*columns),
+                "error_percent": samples.errors(network, percent)[1],
                 "kept": found[f"kept_{start}"],
             }
         )
