@@ -1,20 +1,14 @@
 """Figures of the SmartEE's report."""
 
-from collections.abc import Sequence
+import itertools
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from flexik.cases.smartee.parts.poses import geometry_of, in_box
 from flexik.cases.smartee.report_results import GOALS, QUANTITIES, STEPS, Results
-from flexik.cases.smartee.section import (
-    CENTRE,
-    OUTSIDE,
-    PREVIOUS,
-    PUBLISHED,
-    RANDOM,
-    VALIDATION,
-)
+from flexik.cases.smartee.section import CENTRE, OUTSIDE, PREVIOUS, PUBLISHED, RANDOM, VALIDATION
 from flexik.kinematics.smartee import (
     N_LEGS,
     base_points,
@@ -44,6 +38,7 @@ N_BINS = 20  # of the extent
 def figures(results: Results) -> dict[str, Drawing]:
     """Figures by name."""
     looks = style.looks(results.section.methods)
+    sizes, published = results.section.studies.sizes.poses, results.section.networks[PUBLISHED]
     return {
         "mechanism": mechanism(results),
         **{f"{quantity}_errors": pose_errors(results, quantity, looks) for quantity in QUANTITIES},
@@ -54,11 +49,8 @@ def figures(results: Results) -> dict[str, Drawing]:
             kinds.sizes,
             results.sizes,
             panel="poses",
-            titles={name: f"learnt from {name}" for name in results.section.studies.sizes.poses},
-            published=dict.fromkeys(
-                results.section.studies.sizes.poses,
-                results.section.networks[PUBLISHED].sizes[0][0],
-            ),
+            titles={name: f"learnt from {name}" for name in sizes},
+            published=dict.fromkeys(sizes, published.sizes[0][0]),
             x_label="hidden neurons M (1)",
         ),
     }
@@ -67,17 +59,11 @@ def figures(results: Results) -> dict[str, Drawing]:
 def pose_errors(results: Results, quantity: str, looks: dict) -> Drawing:
     """Errors over the validation poses, a line a network, and the published peak."""
     frame = pd.concat(results.groups[name, 0, VALIDATION] for name in GOALS)
+    frame = frame.assign(number=frame["point"] + 1)[["number", "method", QUANTITIES[quantity]]]
     peak = Rule("y", MM * results.published[quantity], "published peak")
     return draw(
         chart,
-        Layer(
-            frame.assign(number=frame["point"] + 1)[["number", "method", QUANTITIES[quantity]]],
-            "number",
-            QUANTITIES[quantity],
-            "-",
-            hue="method",
-            look={"linewidth": 1.0},
-        ),
+        Layer(frame, "number", QUANTITIES[quantity], "-", "method", look={"linewidth": 1.0}),
         x=Axis("validation pose", integer=True),
         y=Axis(LABELS[quantity], MM, limits=(0.0, None)),
         looks=looks,
@@ -129,13 +115,10 @@ def newton_steps(results: Results) -> Drawing:
 
 def outside(results: Results) -> Drawing:
     """Elbow error against the extent of the pose: median and peak in each of N_BINS."""
-    tables = {
-        name if n_steps == 0 else f"{name} + {n_steps} steps": results.groups[
-            name, n_steps, OUTSIDE
-        ]
-        for name in GOALS
-        for n_steps in (0, STEPS)
-    }
+    tables = {}
+    for name in GOALS:
+        tables[name] = results.groups[name, 0, OUTSIDE]
+        tables[f"{name} + {STEPS} steps"] = results.groups[name, STEPS, OUTSIDE]
     largest = max(table["extent"].max() for table in tables.values())
     edges = np.linspace(0.0, largest, N_BINS + 1)
     rows = []
@@ -165,31 +148,27 @@ def mechanism(results: Results) -> Drawing:
     circles = elbow_circles(geometry, joints[..., :2])
     tips, elbows = leg_tips(circles, joints[..., 2])[0], circles.centre[0]
     bases = base_points(geometry)
-    layers = []
+    lines = []
     for leg in range(N_LEGS):
         turn = (joints[0, leg, 2] + np.linspace(-ARC, ARC, 61))[:, None]
         circle = np.cos(turn) * circles.along[0, leg] + np.sin(turn) * circles.across[0, leg]
-        circle = elbows[leg] + circles.radius * circle
-        layers.append(_line(circle, "", "--", style.GREY, 1.0))
-        for ends, colour, name in (
-            ((bases[leg], elbows[leg]), style.BLUE, "first link"),
-            ((elbows[leg], tips[leg]), style.ORANGE, "second link"),
-        ):
-            layers.append(_line(ends, name if leg == 0 else "", "-", colour, 4.0))
-    for ring, colour, name in ((bases, style.GREY, "base"), (tips, style.GREEN, "plate")):
-        layers.append(_line([*ring, ring[0]], name, "-", colour, 2.0))
-    for points, colour, name in (
-        (bases, style.BLUE, "pitch and roll, actuated"),
-        (elbows, style.INK, "elbow, passive"),
-        (tips, style.GREEN, "ball joint"),
-    ):
-        layers.append(_line(points, name, "o", colour, 6.0))
-    return draw(plane.space, *layers)
+        first, second = ("first link", "second link") if leg == 0 else ("", "")
+        lines += [
+            (elbows[leg] + circles.radius * circle, "", "--", style.GREY, 1.0),
+            ([bases[leg], elbows[leg]], first, "-", style.BLUE, 4.0),
+            ([elbows[leg], tips[leg]], second, "-", style.ORANGE, 4.0),
+        ]
+    lines += [
+        ([*bases, bases[0]], "base", "-", style.GREY, 2.0),
+        ([*tips, tips[0]], "plate", "-", style.GREEN, 2.0),
+        (bases, "pitch and roll, actuated", "o", style.BLUE, 6.0),
+        (elbows, "elbow, passive", "o", style.INK, 6.0),
+        (tips, "ball joint", "o", style.GREEN, 6.0),
+    ]
+    return draw(plane.space, *itertools.starmap(_line, lines))
 
 
-def _line(
-    points: Sequence[np.ndarray] | np.ndarray, label: str, mark: str, colour: str, size: float
-) -> Layer:
+def _line(points: Any, label: str, mark: str, colour: str, size: float) -> Layer:
     frame = pd.DataFrame(np.array(points), columns=["x", "y", "z"])
     look = {"color": colour, "markersize" if mark == "o" else "linewidth": size}
     return Layer(frame, "x", "y", mark, label=label, look=look)

@@ -1,6 +1,6 @@
 """What the report of the SmartEE is made from: frames in SI units, and numbers found in them."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -65,8 +65,8 @@ class Results:
     @cached_property
     def groups(self) -> dict[tuple[str, int, str], pd.DataFrame]:
         """Rows of `errors` by method, n_steps and conditions."""
-        keys = ["method", "n_steps", "conditions"]
-        return {(str(a), int(b), str(c)): rows for (a, b, c), rows in _grouped(self.errors, keys)}
+        groups: Any = self.errors.groupby(["method", "n_steps", "conditions"], sort=False)
+        return dict(iter(groups))
 
     def peak(self, method: str, n_steps: int, conditions: str, column: str = "error") -> float:
         """Largest error, SI units; NaN when a step failed somewhere, or there is no row."""
@@ -81,51 +81,46 @@ class Results:
 
 def read(section: Section) -> Results:
     """Read what the stages and the benchmarks left; raises DataError if something is missing."""
-    data = section.data
+    data, studies = section.data, section.studies
     errors = {
-        (name, conditions): read_table(data / "errors" / conditions / f"{name}.parquet")
+        (name, conditions): read_table(data / f"errors/{conditions}/{name}.parquet")
         for name, method in section.methods.items()
         for conditions in method.conditions or section.conditions
     }
     training = {name: pd.read_csv(data / f"networks/{name}.restarts.csv") for name in GOALS}
-    restarts = {name: read_table(data / "errors" / RESTARTS / f"{name}.parquet") for name in GOALS}
-    studies, sizes = data / "studies", section.studies.sizes.poses
-    by = {poses: by_size(read_table(studies / f"sizes_{poses}.parquet")) for poses in sizes}
+    restarts = {name: read_table(data / f"errors/{RESTARTS}/{name}.parquet") for name in GOALS}
+
+    def study(name: str) -> pd.DataFrame:
+        return read_table(data / f"studies/{name}.parquet")
+
+    starts = [study(f"starts_{name}") for name in studies.starts.trainers]
+    sizes = {poses: by_size(study(f"sizes_{poses}")) for poses in studies.sizes.poses}
+    linear = read_json(data / "studies/linear.json")
+    query_times = read_csv(
+        BENCHMARKS / "smartee.csv",
+        ("n_steps", "microseconds_single", "microseconds_batched"),
+        ("method", "settings"),
+        ("method", "n_steps"),
+    )
+    training_times = read_csv(
+        BENCHMARKS / "smartee_training.csv",
+        ("n_starts", "long_factor", "seconds", "long_seconds", "long_error"),
+        ("trainer", "spread", "settings"),
+        ("trainer", "spread"),
+    )
     return Results(
         section=section,
         errors=_named(errors, "method", "conditions"),
         restarts=_named(restarts, "network"),
         training=_named(training, "network"),
-        starts=pd.concat(
-            [
-                read_table(studies / f"starts_{name}.parquet")
-                for name in section.studies.starts.trainers
-            ],
-            ignore_index=True,
-        ),
-        sensitivity=read_table(studies / "sensitivity.parquet"),
-        linear_error=float(read_json(studies / "linear.json")["mean_squared_error"]),
-        sizes=_named(by, "poses"),
-        geometries=read_table(studies / "geometries.parquet"),
+        starts=pd.concat(starts, ignore_index=True),
+        sensitivity=study("sensitivity"),
+        linear_error=float(linear["mean_squared_error"]),
+        sizes=_named(sizes, "poses"),
+        geometries=study("geometries"),
         published=published_peaks(read_csv(PUBLISHED_FILE, ("peak",), ("quantity", "unit"))),
-        query_times=current(
-            read_csv(
-                BENCHMARKS / "smartee.csv",
-                ("n_steps", "microseconds_single", "microseconds_batched"),
-                ("method", "settings"),
-                ("method", "n_steps"),
-            ),
-            lambda _: section.query_key,
-        ),
-        training_times=current(
-            read_csv(
-                BENCHMARKS / "smartee_training.csv",
-                ("n_starts", "long_factor", "seconds", "long_seconds", "long_error"),
-                ("trainer", "spread", "settings"),
-                ("trainer", "spread"),
-            ),
-            lambda row: section.training_key(row["trainer"]),
-        ),
+        query_times=current(query_times, lambda _: section.query_key),
+        training_times=current(training_times, lambda row: section.training_key(row["trainer"])),
     )
 
 
@@ -133,10 +128,6 @@ def _named(frames: Mapping[Any, pd.DataFrame], *columns: str) -> pd.DataFrame:
     """All `frames` below each other, with columns of their keys."""
     whole = pd.concat(frames, names=list(columns))
     return whole.reset_index(level=list(columns)).reset_index(drop=True)
-
-
-def _grouped(frame: pd.DataFrame, keys: list[str]) -> Iterable[tuple[Any, pd.DataFrame]]:
-    return frame.groupby(keys, sort=False)
 
 
 def published_peaks(table: pd.DataFrame) -> dict[str, float]:

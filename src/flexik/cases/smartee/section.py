@@ -1,11 +1,13 @@
 """The section of a SmartEE in params.yaml, and the machine file beside it."""
 
-from collections.abc import Iterator
+from collections.abc import Sequence
+from operator import attrgetter
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from flexik.files import checksum
+from flexik.parameters.conditions import check_different
 from flexik.parameters.model import Count, Model, Name, Positive, Seed
 from flexik.parameters.networks import Network, Sizes, check_networks
 from flexik.parameters.section import CaseSection
@@ -127,12 +129,7 @@ class Starts(Model):
 
     @model_validator(mode="after")
     def _distinct(self) -> Self:
-        for number, name in enumerate(self.trainers):
-            if name in self.trainers[:number]:
-                raise ValueError(f"trainers.{number}: {name} is there twice")
-        for number, name in enumerate(self.tuned):
-            if name not in self.trainers:
-                raise ValueError(f"tuned.{number}: {name} is not in trainers")
+        check_different("trainers", self.trainers)
         return self
 
 
@@ -146,20 +143,20 @@ class Sensitivity(Model):
     penalty_decreases: Annotated[list[Annotated[float, Field(gt=0, lt=1)]], Field(min_length=1)]
 
 
+class Tried(Sizes):
+    """Numbers of hidden units to compare."""
+
+    maximum: Hidden
+
+
 class SizeStudy(Model):
     """Study of sizes, see learning.size_selection, on the rows of each of `poses`."""
 
     poses: Names
-    n_hidden: Sizes
+    n_hidden: Tried
     n_restarts: Count
     trainer: Name
     seed: Seed
-
-    @model_validator(mode="after")
-    def _not_too_large(self) -> Self:
-        if self.n_hidden.maximum > MOST_HIDDEN:
-            raise ValueError(f"n_hidden.maximum: expected at most {MOST_HIDDEN}")
-        return self
 
 
 class Draws(Model):
@@ -205,9 +202,9 @@ class Section(CaseSection):
             "networks": (PUBLISHED, BEST),
             "methods": (PUBLISHED, BEST, CENTRE, PREVIOUS, NEWTON),
         }
-        for where, names in needed.items():
-            for name in names:
-                if name not in self._named(where):
+        for where, required in needed.items():
+            for name in required:
+                if name not in attrgetter(where)(self):
                     raise ValueError(f"{where}.{name}: is missing")
         for name, network in self.networks.items():
             if name in (CENTRE, PREVIOUS):
@@ -215,11 +212,12 @@ class Section(CaseSection):
             if network.corrects or network.is_selected or max(sum(network.sizes, ())) > MOST_HIDDEN:
                 raise ValueError(f"networks.{name}.n_hidden: expected numbers up to {MOST_HIDDEN}")
         check_networks(self.networks, self.trainers)
-        for key, name, where in self._references():
-            if name not in (known := self._named(where)):
-                raise ValueError(f"{key}: there is no {where} {name!r} ({', '.join(known)})")
-            if where == "samples.poses" and name == SELECTION:
-                raise ValueError(f"{key}: {name} is kept from training")
+        for key, (where, names) in self._references().items():
+            for name in names:
+                if name not in (known := attrgetter(where)(self)):
+                    raise ValueError(f"{key}: there is no {where} {name!r} ({', '.join(known)})")
+                if where == "samples.poses" and name == SELECTION:
+                    raise ValueError(f"{key}: {name} is kept from training")
         if RESTARTS in self.conditions:
             raise ValueError(f"conditions.{RESTARTS}: the name is taken")
         for name in CONDITIONS:
@@ -227,29 +225,30 @@ class Section(CaseSection):
             if self.conditions[name].kind != expected:
                 raise ValueError(f"conditions.{name}.kind: expected {expected}")
         if not isinstance(self.trainers[self.studies.sensitivity.trainer], RegularisedCg):
-            raise ValueError(
-                "studies.sensitivity.trainer: expected one of kind regularised_cg, which has these "
-                "constants"
-            )
+            raise ValueError("studies.sensitivity.trainer: expected one of kind regularised_cg")
         return self
 
     @model_validator(mode="after")
     def _poses_differ(self) -> Self:
         """No two sets have the same poses."""
         seeds: dict[int, str] = {}
-        for where in ("samples.poses", "conditions"):
-            for name, poses in self._named(where).items():
-                if not isinstance(poses, RandomPoses):
-                    continue
-                if where == "conditions" and poses.permutations != "none":
-                    raise ValueError(f"conditions.{name}.permutations: expected none")
-                key = f"{where}.{name}"
-                if (other := seeds.setdefault(poses.seed, key)) != key:
-                    raise ValueError(
-                        f"{key}.seed: {poses.seed} is that of {other}, expected another for every "
-                        "set: the poses would be the same"
-                    )
+        for key, poses in self.sets.items():
+            if not isinstance(poses, RandomPoses):
+                continue
+            if key.startswith("conditions.") and poses.permutations != "none":
+                raise ValueError(f"{key}.permutations: expected none")
+            if (other := seeds.setdefault(poses.seed, key)) != key:
+                raise ValueError(
+                    f"{key}.seed: {poses.seed} is that of {other}, expected another for every set: "
+                    "the poses would be the same"
+                )
         return self
+
+    @property
+    def sets(self) -> dict[str, Poses]:
+        """All sets of poses by key."""
+        samples = {f"samples.poses.{name}": poses for name, poses in self.samples.poses.items()}
+        return samples | {f"conditions.{name}": poses for name, poses in self.conditions.items()}
 
     @property
     def query_key(self) -> str:
@@ -262,32 +261,26 @@ class Section(CaseSection):
         poses = self.samples.poses[starts.poses]
         return checksum(repr((self.trainers.get(trainer), poses, starts.n_hidden)))
 
-    def _named(self, where: str) -> dict[str, object]:
-        """What stands under a key by name."""
-        value: object = self
-        for part in where.split("."):
-            value = getattr(value, part)
-        assert isinstance(value, dict)
-        return value
-
-    def _references(self) -> Iterator[tuple[str, str, str]]:
-        """Key, the name that stands there, and where it must be known."""
+    def _references(self) -> dict[str, tuple[str, Sequence[str]]]:
+        """By key where the names that stand there must be known, and these names."""
+        starts, sizes = self.studies.starts, self.studies.sizes
+        poses, sensitivity = "samples.poses", self.studies.sensitivity
+        found: dict[str, tuple[str, Sequence[str]]] = {
+            "studies.starts.poses": (poses, [starts.poses]),
+            "studies.starts.trainers": ("trainers", starts.trainers),
+            "studies.starts.tuned": ("studies.starts.trainers", starts.tuned),
+            "studies.sensitivity.trainer": ("trainers", [sensitivity.trainer]),
+            "studies.sensitivity.spread": ("studies.starts.spreads", [sensitivity.spread]),
+            "studies.sizes.poses": (poses, sizes.poses),
+            "studies.sizes.trainer": ("trainers", [sizes.trainer]),
+        }
         for name, network in self.networks.items():
-            yield f"networks.{name}.learns", str(network.learns), "samples.poses"
+            found[f"networks.{name}.learns"] = (poses, [str(network.learns)])
         for name, method in self.methods.items():
+            found[f"methods.{name}.conditions"] = ("conditions", method.conditions or [])
             if method.start not in (CENTRE, PREVIOUS):
-                yield f"methods.{name}.start", method.start, "networks"
-            for number, conditions in enumerate(method.conditions or []):
-                yield f"methods.{name}.conditions.{number}", conditions, "conditions"
-        studies = self.studies
-        yield "studies.starts.poses", studies.starts.poses, "samples.poses"
-        for number, name in enumerate(studies.starts.trainers):
-            yield f"studies.starts.trainers.{number}", name, "trainers"
-        yield "studies.sensitivity.trainer", studies.sensitivity.trainer, "trainers"
-        yield "studies.sensitivity.spread", studies.sensitivity.spread, "studies.starts.spreads"
-        for number, name in enumerate(studies.sizes.poses):
-            yield f"studies.sizes.poses.{number}", name, "samples.poses"
-        yield "studies.sizes.trainer", studies.sizes.trainer, "trainers"
+                found[f"methods.{name}.start"] = ("networks", [method.start])
+        return found
 
 
 def check(section: Section) -> None:

@@ -1,17 +1,16 @@
 """Errors of the direct kinematics of the SmartEE, and their spread over restarts of a training."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.cases.smartee.parts.errors import COLUMNS, conditions_of, errors, judge_of
+from flexik.cases.smartee.parts.errors import COLUMNS, conditions_of, judge_of
 from flexik.cases.smartee.parts.methods import method, network_file
 from flexik.cases.smartee.parts.poses import (
     ACTUATED_FIELDS,
-    ELBOW_FIELDS,
     POSE_FIELDS,
-    actuated_of,
     centre_elbows,
     extent_of,
     geometry_of,
@@ -27,7 +26,7 @@ from flexik.cases.smartee.section import (
     Method,
     Section,
 )
-from flexik.datasets.parts import Part, Work, Writer, table, whole
+from flexik.datasets.parts import Part, Work, Writer, stacked, table, whole
 from flexik.datasets.tables import Field, read_table
 from flexik.evaluation.errors import evaluate, fields_of
 from flexik.learning.storage import load_network, load_restarts
@@ -62,15 +61,13 @@ def parts(section: Section) -> list[Part]:
     return found
 
 
-def prepare_errors(
-    *, machine: Machine, box: Box, settings: Method, rows: Path, network: Path | None = None
-) -> Work:
+def prepare_errors(**settings: Any) -> Work:
     """Errors of a method, by each of its numbers of steps, on a set of conditions."""
-    return whole(judged, machine=machine, box=box, settings=settings, rows=rows, network=network)
+    return whole(judged, **settings)
 
 
 def judged(
-    machine: Machine, box: Box, settings: Method, rows: Path, network: Path | None
+    machine: Machine, box: Box, settings: Method, rows: Path, network: Path | None = None
 ) -> dict[str, Writer]:
     """Table of errors, a row a number of steps and a pose; the queries stand in `rows`."""
     poses = read_table(rows)
@@ -83,16 +80,15 @@ def judged(
         asked = method(machine, settings, n_steps, trained)
         tables.append(evaluate(asked, conditions, judge, COLUMNS))
         tables[-1] |= {N_STEPS.name: np.full(len(poses), n_steps), EXTENT.name: extent}
-    queries = {field.name for field in COLUMNS.query}
-    known = fields_of(tables[0], COLUMNS)
-    fields = [N_STEPS, EXTENT, *(f for f in known if f.name not in {*queries, "n_steps", "extent"})]
-    columns = {f.name: np.concatenate([t[f.name] for t in tables]) for f in fields}
-    return {".parquet": table(columns, fields)}
+    left_out = {field.name for field in (*COLUMNS.query, N_STEPS, EXTENT)}
+    known = [field for field in fields_of(tables[0], COLUMNS) if field.name not in left_out]
+    fields = [N_STEPS, EXTENT, *known]
+    return {".parquet": table(stacked(tables, fields), fields)}
 
 
-def prepare_restarts(*, machine: Machine, restarts: Path, rows: dict[str, Path]) -> Work:
+def prepare_restarts(**settings: Any) -> Work:
     """Largest errors of the networks of all restarts, those that were not chosen too."""
-    return whole(largest, machine=machine, restarts=restarts, rows=rows)
+    return whole(largest, **settings)
 
 
 def largest(machine: Machine, restarts: Path, rows: dict[str, Path]) -> dict[str, Writer]:
@@ -100,11 +96,9 @@ def largest(machine: Machine, restarts: Path, rows: dict[str, Path]) -> dict[str
     found: list[tuple[object, ...]] = []
     for conditions, file in rows.items():
         poses = read_table(file)
-        query, expected = values(poses, ACTUATED_FIELDS), values(poses, ELBOW_FIELDS)
+        query, judge = values(poses, ACTUATED_FIELDS), judge_of(geometry_of(machine), poses)
         for number, network in load_restarts(restarts).items():
-            given = values(poses, POSE_FIELDS), actuated_of(query), expected, network.predict(query)
-            by_name = errors(geometry_of(machine), *given)
-            peaks = (by_name[field.name].max() for field in COLUMNS.errors)
-            found.append((number, conditions, *peaks))
+            by_name = judge(query, network.predict(query))
+            found.append((number, conditions, *(by_name[f.name].max() for f in COLUMNS.errors)))
     columns = zip(RESTART_FIELDS, zip(*found, strict=True), strict=True)
     return {".parquet": table({f.name: np.array(v) for f, v in columns}, RESTART_FIELDS)}

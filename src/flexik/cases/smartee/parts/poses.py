@@ -142,20 +142,14 @@ def centre_elbows(machine: Machine, box: Box) -> Array:
     return inverse(geometry_of(machine), np.array([box.centre]), np.eye(3)[None]).joints[0, :, 2]
 
 
-def sets_of(section: Section) -> dict[str, Poses]:
-    """All sets of poses by their key in params.yaml."""
-    samples = {f"{section.name}.samples.poses.{k}": v for k, v in section.samples.poses.items()}
-    return samples | {f"{section.name}.conditions.{k}": v for k, v in section.conditions.items()}
-
-
 def check_reach(section: Section) -> None:
     """Raise ParameterError when the legs do not reach the box's centre, or a pose of a set."""
     box = section.samples.box
     if np.isnan(centre_elbows(section.machine, box)).any():
         key = f"{section.name}.samples.box.centre"
         raise ParameterError(f"params.yaml: {key}: the legs do not reach it")
-    for key, poses in sets_of(section).items():
-        reached(section.machine, box, poses, f"params.yaml: {key}")
+    for key, poses in section.sets.items():
+        reached(section.machine, box, poses, f"params.yaml: {section.name}.{key}")
 
 
 def values(rows: pd.DataFrame, fields: tuple[Field, ...]) -> Array:
