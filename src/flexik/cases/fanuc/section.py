@@ -1,9 +1,9 @@
 """The section `fanuc` of params.yaml and the machine file data/machines/fanuc.yaml."""
 
 import itertools
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from flexik.errors import ParameterError
 from flexik.parameters.model import Count, Interval, Model, Name, NotNegative, Positive, Seed
@@ -11,16 +11,27 @@ from flexik.parameters.networks import Network, check_networks
 from flexik.parameters.section import CaseSection
 from flexik.parameters.trainers import BackPropagation
 
-# Columns: position; pose and what stands for joints, see kinematics.pose_representation
-N_INPUTS = {"each_joint": 3, "all_joints": 3, "arm_configuration": 12}
-N_OUTPUTS = {"each_joint": 1, "all_joints": 6, "arm_configuration": 9}
+# Columns in and out: of position and joints; of kinematics.pose_representation
+N_COLUMNS = {"each_joint": (3, 1), "all_joints": (3, 6), "arm_configuration": (12, 9)}
 N_JOINTS = 6
 PUBLISHED_NETWORKS = ("config1", "config2")
 WHOLE, EXACT = "whole_workspace", "closed_form"
 # Of the taught samples, without a network
 LOOKED_UP = ("nearest_sample", "interpolated")
 CONDITIONS = ("path", "off_path", "random_poses")
-MM = 1e3
+
+
+def _increasing(values: Any) -> Any:
+    for number, pair in enumerate(itertools.pairwise(values), start=1):
+        # as the report prints them
+        one, other = (float(f"{value:g}") for value in pair)
+        if one >= other:
+            raise ValueError(f"{number}: must exceed the entry before it, in six digits")
+    return values
+
+
+Increasing = AfterValidator(_increasing)
+Range = Annotated[Interval, Increasing]
 
 
 class Joint(Model):
@@ -49,18 +60,11 @@ class Machine(Model):
 class Path(Model):
     """The taught path, see parts.samples."""
 
-    region: Annotated[list[Interval], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
+    region: Annotated[list[Range], Field(min_length=N_JOINTS, max_length=N_JOINTS)]
     n_via_points: Annotated[int, Field(ge=3)]
     n_training: Annotated[int, Field(ge=2)]
     n_test: Count
     seed: Seed = 1
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        for number, (low, high) in enumerate(self.region):
-            if not low < high:
-                raise ValueError(f"region.{number}: must increase")
-        return self
 
 
 class Samples(Model):
@@ -74,7 +78,7 @@ class Samples(Model):
 class OffPath(Model):
     """Targets beside the path."""
 
-    distances: Annotated[list[NotNegative], Field(min_length=1)]
+    distances: Annotated[list[NotNegative], Field(min_length=1), Increasing]
     seed: Seed
 
 
@@ -124,13 +128,13 @@ class Study(Model):
 class SizeStudy(Study):
     """Numbers of hidden neurons."""
 
-    values: Annotated[list[Count], Field(min_length=1)]
+    values: Annotated[list[Count], Field(min_length=1), Increasing]
 
 
 class FactorStudy(Study):
     """Learning factors."""
 
-    values: Annotated[list[Positive], Field(min_length=1)]
+    values: Annotated[list[Positive], Field(min_length=1), Increasing]
 
 
 class Studies(Model):
@@ -179,56 +183,50 @@ class Section(CaseSection):
                 )
         check_networks(self.networks, self.trainers)
         for name, network in self.networks.items():
-            self._check_network(name, network)
+            self._check_network(f"networks.{name}", network)
         self._check_methods()
-        for name in ("n_hidden", "learning_factor"):
-            self._check_study(name)
-        distances = self.conditions.off_path.distances
-        check_entries("conditions.off_path.distances", distances)
-        for number, pair in enumerate(itertools.pairwise(distances), start=1):
-            one, other = (f"{MM * distance:g} mm" for distance in pair)
-            if one == other:
-                raise ValueError(
-                    f"conditions.off_path.distances.{number}: prints as {one}, as the entry before"
-                )
+        for name in type(self.studies).model_fields:
+            self._check_study(f"studies.{name}", getattr(self.studies, name))
         return self
 
     def _check_methods(self) -> None:
         """The methods that the report compares are there; each network has a method that fits."""
-        expected = dict.fromkeys(self.path_networks, "predicted")
+        if WHOLE not in self.networks:
+            raise ValueError(f"networks.{WHOLE}: expected a network that learns arm_configuration")
+        expected: dict[str, str] = dict.fromkeys(self.path_networks, "predicted")
         expected |= {name: name for name in (*LOOKED_UP, EXACT)} | {WHOLE: "arm_configurations"}
-        for name in self.methods:
+        for name in [*self.methods, *expected]:
             if name not in expected:
                 raise ValueError(
                     f"methods.{name}: there is no such network ({', '.join(expected)})"
                 )
-        for name, kind in expected.items():
-            if name not in self.methods or self.methods[name].kind != kind:
-                raise ValueError(f"methods.{name}: expected a method of kind {kind}")
-        if WHOLE not in self.networks:
-            raise ValueError(f"networks.{WHOLE}: expected a network that learns arm_configuration")
+            if name not in self.methods or self.methods[name].kind != expected[name]:
+                raise ValueError(f"methods.{name}: expected a method of kind {expected[name]}")
 
-    def _check_network(self, name: str, network: Network) -> None:
-        """No network has more weights than numbers to fit."""
-        key = f"networks.{name}"
-        if network.learns not in N_INPUTS:
-            raise ValueError(f"{key}.learns: expected one of {', '.join(N_INPUTS)}")
+    def _check_network(self, key: str, network: Network) -> None:
+        if network.learns not in N_COLUMNS:
+            raise ValueError(f"{key}.learns: expected one of {', '.join(N_COLUMNS)}")
         if network.is_selected:
             raise ValueError(f"{key}.n_hidden: expected numbers, sizes are not selected here")
         if network.learns != "arm_configuration" and len(network.layers) != 1:
             # those of one joint each are joined layer by layer
             raise ValueError(f"{key}.n_hidden: expected one layer, got {len(network.layers)}")
-        samples = self.samples
-        whole = network.learns == "arm_configuration"
-        n, source = (
-            (samples.n_poses, "n_poses") if whole else (samples.path.n_training, "path.n_training")
-        )
-        n_in, n_out = N_INPUTS[network.learns], N_OUTPUTS[network.learns]
-        check_size(f"{key}.n_hidden", n_weights(n_in, network.sizes[0], n_out), n * n_out, source)
+        self._check_size(f"{key}.n_hidden", network.learns, network.sizes[0])
 
-    def _check_study(self, name: str) -> None:
-        study, key = getattr(self.studies, name), f"studies.{name}"
-        check_entries(f"{key}.values", study.values)
+    def _check_size(self, key: str, learns: str, n_hidden: tuple[int, ...]) -> None:
+        """No network has more weights than numbers to fit."""
+        n, source = self.samples.path.n_training, "path.n_training"
+        if learns == "arm_configuration":
+            n, source = self.samples.n_poses, "n_poses"
+        n_inputs, n_outputs = N_COLUMNS[learns]
+        weights = n_weights(n_inputs, n_hidden, n_outputs)
+        if weights > n * n_outputs:
+            raise ValueError(
+                f"{key}: {weights} weights, more than the {n * n_outputs} numbers there are to fit "
+                f"(samples.{source})"
+            )
+
+    def _check_study(self, key: str, study: Study) -> None:
         known = [n for n, each in self.networks.items() if each.learns == "each_joint"]
         if study.network not in known:
             raise ValueError(
@@ -241,33 +239,15 @@ class Section(CaseSection):
                 f"{key}.network: {study.network!r} is not trained by back_propagation with a "
                 "constant learning factor (rate_increase 1)"
             )
-        sizes = study.values if isinstance(study, SizeStudy) else []
-        for number, size in enumerate(sizes):
-            n = self.samples.path.n_training
-            weights = n_weights(N_INPUTS["each_joint"], (size,), 1)
-            check_size(f"{key}.values.{number}", weights, n, "path.n_training")
+        if isinstance(study, SizeStudy):
+            for number, size in enumerate(study.values):
+                self._check_size(f"{key}.values.{number}", "each_joint", (size,))
 
 
 def n_weights(n_inputs: int, n_hidden: tuple[int, ...], n_outputs: int) -> int:
     """Weights and biases of a network."""
     sizes = [n_inputs, *n_hidden, n_outputs]
     return sum(units * (before + 1) for before, units in itertools.pairwise(sizes))
-
-
-def check_size(key: str, weights: int, numbers: int, samples: str) -> None:
-    """Raise ValueError if there are more `weights` than `numbers` of `samples` to fit."""
-    if weights > numbers:
-        raise ValueError(
-            f"{key}: {weights} weights, more than the {numbers} numbers there are to fit "
-            f"(samples.{samples})"
-        )
-
-
-def check_entries(key: str, values: list[float] | list[int]) -> None:
-    """Raise ValueError unless `values` increase."""
-    for number, (one, other) in enumerate(itertools.pairwise(values), start=1):
-        if other <= one:
-            raise ValueError(f"{key}.{number}: must exceed the entry before it")
 
 
 def check(section: Section) -> None:
