@@ -271,7 +271,7 @@ def test_success_is_counted_at_every_threshold(results):
     assert table.columns.tolist() == ["1e-05 (%)", "2e-06 (%)"]
     assert table.loc[("regularised_cg", "near")].tolist() == [100.0, 0.0]
     assert table.loc[("unpenalised_cg", "far")].tolist() == [0.0] * 2
-    row = report_starts.starts(results).set_index(["trainer", "start"]).loc[PAIR[1], "far"]
+    row = report_starts.starts(results).frame.set_index(["trainer", "start"]).loc[PAIR[1], "far"]
     assert row[["success (%)", "to success", "seconds a run"]].tolist() == [0.0, "", 0.25]
     found = report_starts.metrics(results)
     assert found["starts.unpenalised_cg.far.median_error"] == 4e-5

@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from flexik.cases.smartee.report_results import Results, scientific
+from flexik.cases.smartee.report_results import STATISTICS, Results, scientific
 from flexik.cases.smartee.section import SELECTION
 from flexik.learning.starts import by_trainer
 from flexik.reporting.report import Content
-from flexik.reporting.style import MM
-from flexik.reporting.tables import Table
+from flexik.reporting.tables import Column, Table, mm, table
 
 PENALISED, UNPENALISED = "regularised_cg", "unpenalised_cg"
 # A median error this near, relatively, to that of the best linear map is at its plateau
@@ -21,9 +20,8 @@ CAPPED = "iterations"
 
 def content(results: Results) -> Content:
     """Tables, metrics and values."""
-    decimals = {"success (%)": 1, "median elbow peak (mrad)": 2, "seconds a run": 2}
     tables = {
-        "starts": Table(starts(results), decimals),
+        "starts": starts(results),
         "thresholds": Table(thresholds(results), 1),
         "sensitivity": Table(sensitivity(results), 1),
         "sizes": Table(sizes(results), 6),
@@ -41,39 +39,33 @@ def metrics(results: Results) -> dict[str, float]:
     return found
 
 
-TITLES = {
+STARTS = {
     "trainer": "trainer",
-    "spread": "start",
-    "success_percent": "success (%)",
-    "least_error": "least error",
-    "median_error": "median error",
-    "largest_error": "largest error",
-    "peak_mrad": "median elbow peak (mrad)",
+    "start": "spread",
+    "success (%)": Column("success_share", 1, 100.0),
+    **{f"{name} error": f"{name}_error" for name in STATISTICS},
+    "median elbow peak (mrad)": mm("median_judged"),
     "iterations": "iterations",
-    "median_success_iteration": "to success",
-    "reasons": "ended by",
-    "seconds": "seconds a run",
-    "long_error": "median error of long runs",
+    "to success": "median_success_iteration",
+    "ended by": "reasons",
+    "seconds a run": "seconds",
+    "median error of long runs": "long_error",
 }
 
 
-def starts(results: Results) -> pd.DataFrame:
+def starts(results: Results) -> Table:
     """A row for every trainer and spread, with the times of the benchmark."""
     keys, trainers = ["trainer", "spread"], results.section.trainers
     times = results.training_times[[*keys, "seconds", "long_error"]]
     found = by_trainer(results.starts).merge(times, "left", keys)
     ends = results.starts.groupby(keys, sort=False)["stop_reason"].agg(_counted)
-    found = found.assign(
-        success_percent=100.0 * found["success_share"],
-        peak_mrad=MM * found["median_judged"],
-        iterations=[str(trainers[name].n_iterations) for name in found["trainer"]],
-        reasons=ends.to_numpy(),
-    )
+    found["reasons"] = ends.to_numpy()
+    found["iterations"] = [str(trainers[name].n_iterations) for name in found["trainer"]]
     for name in ("least_error", "median_error", "largest_error", "long_error"):
         found[name] = found[name].map(scientific)
     first = found["median_success_iteration"]
     found["median_success_iteration"] = ["" if np.isnan(v) else f"{v:.0f}" for v in first]
-    return found[list(TITLES)].rename(columns=TITLES)
+    return table(found, STARTS)
 
 
 def thresholds(results: Results) -> pd.DataFrame:
@@ -91,7 +83,7 @@ def sensitivity(results: Results) -> pd.DataFrame:
     for pair, group in results.sensitivity.groupby("trainer", sort=False)["error"]:
         row: dict[str, object] = dict(zip(("p", "tau"), str(pair).split(", "), strict=True))
         row["success (%)"] = _share(group, results.section.studies.starts.success)
-        for statistic, name in (("min", "least"), ("median", "median"), ("max", "largest")):
+        for name, statistic in STATISTICS.items():
             row[f"{name} error"] = scientific(group.agg(statistic))
         rows.append(row)
     return pd.DataFrame(rows)
@@ -105,16 +97,15 @@ def sizes(results: Results) -> pd.DataFrame:
         "worst_selection_error": "selection, worst start",
     }
     parts = []
-    for poses, table in results.sizes.groupby("poses", sort=False):
+    for poses, rows in results.sizes.groupby("poses", sort=False):
         labels = {column: f"{poses}: {label}" for column, label in names.items()}
-        parts.append(table.set_index("n_hidden")[list(names)].rename(columns=labels))
+        parts.append(rows.set_index("n_hidden")[list(names)].rename(columns=labels))
     return pd.concat(parts, axis=1).rename_axis("M").reset_index()
 
 
 def values(results: Results) -> dict[str, Any]:
     """Numbers for the sentences."""
-    own, table = results.section.studies.starts, by_trainer(results.starts)
-    times = results.training_times
+    own, times = results.section.studies.starts, results.training_times
     reached = times["long_error"] <= own.success
     return {
         "starts": own,
@@ -128,7 +119,7 @@ def values(results: Results) -> dict[str, Any]:
         "linear_error": results.linear_error,
         "plateaus": [
             row
-            for row in table.to_dict("records")
+            for row in by_trainer(results.starts).to_dict("records")
             if abs(row["median_error"] / results.linear_error - 1.0) <= PLATEAU
         ],
         "seconds": times["seconds"].tolist(),
@@ -176,8 +167,7 @@ def _long_ratios(results: Results) -> list[str]:
     """Median error of long runs from the farthest starts over that from the nearest."""
     own = results.section.studies.starts
     near, far = (choose(own.spreads, key=own.spreads.__getitem__) for choose in (min, max))
-    rows = results.training_times.to_dict("records")
-    errors = {(row["trainer"], row["spread"]): row["long_error"] for row in rows}
+    errors = results.training_times.set_index(["trainer", "spread"])["long_error"]
     return [
         f"{trainer} {errors[trainer, far] / errors[trainer, near]:.1f}"
         for trainer in own.trainers
@@ -187,7 +177,7 @@ def _long_ratios(results: Results) -> list[str]:
 
 def _other_constants(results: Results) -> dict[str, Any]:
     """How much hangs on the constants the paper does not give."""
-    chosen, table = results.section.studies.sensitivity, sensitivity(results)
+    chosen, shares = results.section.studies.sensitivity, sensitivity(results)["success (%)"]
     same = results.starts.query("spread == @chosen.spread and start < @chosen.n_starts")
     medians = same.groupby("trainer")["error"].median()
     errors = results.sensitivity.groupby("trainer")["error"].median()
@@ -195,23 +185,23 @@ def _other_constants(results: Results) -> dict[str, Any]:
     return {
         "chosen": chosen,
         "trainer": results.section.trainers[chosen.trainer],
-        "shares": [table["success (%)"].min(), table["success (%)"].max()],
+        "shares": [shares.min(), shares.max()],
         "without": without,
         "n_lower": int((errors < without).sum()),
         "n_pairs": len(errors),
     }
 
 
-def _size(results: Results, poses: str, table: pd.DataFrame) -> dict[str, Any]:
+def _size(results: Results, poses: str, rows: pd.DataFrame) -> dict[str, Any]:
     """Where the selection error is least, and what it is over the training error."""
-    best = table["n_hidden"].to_numpy()[table["selection_error"].argmin()]
-    ratio = table["selection_error"] / table["training_error"]
+    best = rows["n_hidden"].to_numpy()[rows["selection_error"].argmin()]
+    ratio = rows["selection_error"] / rows["training_error"]
     samples = results.section.samples.poses
     return {
         "poses": poses,
         "n_poses": samples[poses].n_poses,
         "best": int(best),
-        "largest": bool(best == table["n_hidden"].max()),
+        "largest": bool(best == rows["n_hidden"].max()),
         "ratios": [ratio.min(), ratio.max()],
         "extents": [samples[poses].extent, samples[SELECTION].extent],
     }

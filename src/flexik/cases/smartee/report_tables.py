@@ -15,6 +15,7 @@ from flexik.cases.smartee.report_results import (
     GOALS,
     LABELS,
     QUANTITIES,
+    STATISTICS,
     STEPS,
     UNITS,
     Results,
@@ -44,12 +45,13 @@ TIMES = {"single (us)": "microseconds_single", "batched (us)": "microseconds_bat
 PREFIXES = {"": "validation", "random_": "random", "corners_": "corners"}
 GEOMETRIES = {
     "dimensions": "name",
-    **{f"{name} (mm)": mm(column, 0) for name, column in
-       (("base", "base_radius"), ("plate", "plate_radius"), ("height", "height"))},
+    "base (mm)": mm("base_radius", 0),
+    "plate (mm)": mm("plate_radius", 0),
+    "height (mm)": mm("height", 0),
     "reached (%)": Column("reached_share", scale=100.0),
     "median condition": "median_condition",
     "largest condition": "largest_condition",
-}  # fmt: skip
+}
 
 
 def content(results: Results) -> Content:
@@ -61,7 +63,7 @@ def content(results: Results) -> Content:
         "draws": Table(draws(results), {"meets (%)": 1} | dict.fromkeys(DRAWN, 4)),
         "other_geometries": table(results.geometries, GEOMETRIES),
         "direct_kinematics": Table(
-            direct_kinematics(results), dict(zip(TIMES, (0, 1), strict=True))
+            direct_kinematics(results), {"single (us)": 0, "batched (us)": 1}
         ),
         "newton": Table(newton(results)),
         "outside": Table(outside(results)),
@@ -96,7 +98,7 @@ def restarts(results: Results) -> pd.DataFrame:
         row["chosen"] = MM * results.peak(name, 0, "validation", column)
         for conditions, suffix in (("validation", ""), ("random", ", random")):
             found = MM * results.over_restarts(name, conditions, column)
-            for statistic, label in (("min", "least"), ("median", "median"), ("max", "largest")):
+            for label, statistic in STATISTICS.items():
                 row[label + suffix] = found.agg(statistic)
         rows.append(row)
     return pd.DataFrame(rows)

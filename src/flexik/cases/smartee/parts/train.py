@@ -33,7 +33,7 @@ def parts(section: Section) -> list[Part]:
 def prepare(*, network: Network, trainer: Stopping, rows: Path, selection: Path) -> Work:
     """Train from every start."""
     (n_hidden,) = network.sizes  # the section refuses several
-    architecture = Architecture(n_hidden if len(n_hidden) > 1 else n_hidden[0], network.activation)
+    architecture = Architecture(n_hidden, network.activation)
     return fit(lesson(architecture, trainer, network.seed, rows, selection), network.n_restarts)
 
 
