@@ -53,7 +53,7 @@ FIGURES = {
     "distribution": lambda f: kinds.distribution(f, "error", "method", Y),
     "sequences": lambda f: kinds.sequences({"error": f["error"]}, style.COLOURS),
     "maps": lambda f: plane.maps(f, "x", "y", "error", "method", label="e (mm)", cell=1.0),
-    "space": lambda f: plane.space(Layer(f, "x", "error", "-", "method"), z="y"),
+    "space": lambda f: plane.space(Layer(f, "x", "error", "-"), z="y"),
 }
 
 
@@ -81,10 +81,9 @@ def test_failed_drawing_leaves_the_old_file(tmp_path):
 
 
 def test_a_hue_has_one_look_and_selected_ones_are_dashed():
-    looks = style.looks(["none", "a", "b", "a_selected", "c"], ("_selected",), {"c": style.CHOSEN})
+    looks = style.looks(["none", "a", "b", "a_selected"], ("_selected",))
     assert looks["a_selected"]["color"] == looks["a"]["color"] != looks["b"]["color"]
     assert (looks["a"]["linestyle"], looks["a_selected"]["linestyle"]) == ("-", "--")
-    assert looks["c"] == style.CHOSEN
     many = style.looks(range(20), ("_selected",))
     assert len({tuple(look.items()) for look in many.values()}) == 20
     shades = style.shades([3.0, 1.0, 3.0])
@@ -241,8 +240,9 @@ def test_sizes_mark_the_choice_and_the_published_in_their_panel():
         assert len(lines(axes, "published size")) == n_published
 
 
-def test_sequences_are_mapped_onto_minus_one_to_one():
-    figure = kinds.sequences({"a": np.arange(5.0), "b": np.ones(5)}, style.COLOURS, detail=2)
+def test_sequences_are_mapped_onto_minus_one_to_one(monkeypatch):
+    monkeypatch.setattr(kinds, "DETAIL", 2)
+    figure = kinds.sequences({"a": np.arange(5.0), "b": np.ones(5)}, style.COLOURS)
     whole, first, constant, _ = (axes.lines[0].get_ydata() for axes in figure.axes)
     assert whole.tolist() == [-1, -0.5, 0, 0.5, 1] and first.tolist() == [-1, -0.5]
     assert set(constant) == {0.0}

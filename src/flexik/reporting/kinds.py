@@ -16,6 +16,7 @@ from flexik.reporting.chart import Axis, Layer, Rule, chart
 
 MARKED = {0.5: "o", 0.99: "D"}  # quantiles with a mark on a distribution
 BAND = "#F3F3F3"
+DETAIL = 100  # numbers of a sequence that are enlarged
 BEST, MEDIAN = "selection error, best start", "selection error, median"
 SPAN, TRAINING = "selection error, best to worst start", "training error"
 
@@ -113,14 +114,14 @@ def distribution(
     *,
     what: str = "conditions",
     panel: str | None = None,
-    quantiles: bool = True,
     of_all: bool = False,
     **options: Any,
 ) -> Figure:
     """Share of the rows with at most each value, a line for every value of `hue`.
 
+    In one panel MARKED are marked on the curves and written in the legend.
+
     what : the rows, in words.
-    quantiles : mark MARKED on the curves and write them in the legend (for one panel only).
     of_all : share of all rows, those without a number (failed) among them.
     """
     keys = [hue, *([panel] if panel else [])]
@@ -131,7 +132,7 @@ def distribution(
         curve = pd.DataFrame({"at": [values[0], *values], "share": [0.0, *share]})
         named: dict[str, Any] = dict(zip(keys, names, strict=True))
         curve, label = curve.assign(**named), str(names[0])
-        if quantiles and isinstance(x, Axis) and not panel:
+        if isinstance(x, Axis) and not panel:
             found = {q: int(np.searchsorted(share, 100 * q - 1e-9)) for q in MARKED}
             label += f": {', '.join(_three(x.scale * values[k]) for k in found.values())}"
             for q, k in found.items():
@@ -192,9 +193,7 @@ def sizes(
     return chart(*layers, x=x, y=y, panel=panel, rules=rules, **options)
 
 
-def sequences(
-    parts: Mapping[str, Sequence[float]], colours: Sequence[str], *, detail: int = 100
-) -> Figure:
+def sequences(parts: Mapping[str, Sequence[float]], colours: Sequence[str]) -> Figure:
     """Numbers in their order, mapped onto [-1, 1], and the first of them enlarged beside.
 
     parts : numbers of a row of panels, by its title.
@@ -207,12 +206,12 @@ def sequences(
         low, high = numbers.min(), numbers.max()
         normalised = 2 * (numbers - low) / (high - low) - 1 if high > low else 0 * numbers
         whole = pd.DataFrame({"number": np.arange(1, len(numbers) + 1), "value": normalised})
-        first = f"first {min(detail, len(whole))} of {title}"
+        first = f"first {min(DETAIL, len(whole))} of {title}"
         titles |= {title: title, first: "" if titles else first.removesuffix(f" of {title}")}
         small, large = {"markersize": 1.5}, {"markersize": 3, "linewidth": 0.8}
         for name, rows, mark, look in (
             (title, whole, ".", small),
-            (first, whole[:detail], ".-", large),
+            (first, whole[:DETAIL], ".-", large),
         ):
             rows = rows.assign(panel=name)
             layers.append(Layer(rows, "number", "value", mark, look={"color": colour, **look}))

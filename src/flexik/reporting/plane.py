@@ -1,7 +1,6 @@
 """Figures over the plane and in space: maps of a value, and mechanisms of three dimensions."""
 
 import textwrap
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -13,14 +12,13 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from flexik.reporting import style
-from flexik.reporting.chart import SPAN, Axis, Layer
+from flexik.reporting.chart import SPAN, Layer
 
 Array = NDArray[np.float64]
 
 # bright is bad; neither end is white, which is left to the empty squares
 MAP = ListedColormap(mpl.colormaps["magma"](np.linspace(0.08, 0.95, 256)))
 STEPS = [float(f"{m}e{k}") for k in range(-18, 19) for m in (1, 2, 5)]
-MILLIMETRES = tuple(Axis(f"{k} (mm)", style.MM) for k in "xyz")
 
 
 def maps(
@@ -92,35 +90,18 @@ def _means(rows: pd.DataFrame, x: str, y: str, value: str, edges: list[Array]) -
     return np.divide(total, number, out=np.full_like(total, np.nan), where=number > 0)
 
 
-def space(
-    *layers: Layer,
-    z: str = "z",
-    axes_of: Sequence[Axis] = MILLIMETRES,
-    looks: Mapping[Any, style.Look] | None = None,
-    view: tuple[float, float] = (18.0, -50.0),
-    height: float = 5.6,
-) -> Figure:
-    """Lines ("-", "--") and dots ("o") of layers in space, as reporting.chart draws them.
-
-    z : column of the third coordinate.
-    axes_of : labels and scales.
-    view : elevation and azimuth, degrees.
-    """
-    figure = Figure(figsize=(style.WIDTH, height))
+def space(*layers: Layer, z: str = "z") -> Figure:
+    """Lines ("-", "--") and dots ("o") of layers in space, mm; `z` is the third coordinate, m."""
+    figure = Figure(figsize=(style.WIDTH, 5.6))
     axes: Any = figure.add_subplot(projection="3d")
     for layer in layers:
-        keys = [key for key in (layer.hue, layer.group) if key]
-        for values, rows in layer.frame.groupby(keys, sort=False) if keys else [((), layer.frame)]:
-            look = dict((looks or {}).get(values[0], {})) if layer.hue else {}
-            label = str(values[0]) if layer.hue and layer.label is None else layer.label
-            points = zip(axes_of, (layer.x, layer.y, z), strict=True)
-            dot = {"linestyle": "none", "marker": "o"}
-            look |= dot if layer.mark == "o" else {"linestyle": layer.mark}
-            data = [axis.scale * rows[name] for axis, name in points]
-            axes.plot(*data, label=label or None, **look | dict(layer.look))
-    axes.set(**{f"{k}label": axis.label for axis, k in zip(axes_of, "xyz", strict=True)})
+        dot = {"linestyle": "none", "marker": "o"}
+        look = dot if layer.mark == "o" else {"linestyle": layer.mark}
+        data = (style.MM * layer.frame[name] for name in (layer.x, layer.y, z))
+        axes.plot(*data, label=layer.label or None, **look | dict(layer.look))
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", zlabel="z (mm)")
     axes.set_aspect("equal")
-    axes.view_init(elev=view[0], azim=view[1])
+    axes.view_init(elev=18.0, azim=-50.0)
     entries = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
     figure.legend(entries.values(), entries.keys(), loc="outside right upper")
     return figure

@@ -93,24 +93,12 @@ def write_report(
 ) -> None:
     """Write README.md, metrics.json, tables (CSV, Markdown) and figures (PNG) into `folder`.
 
-    Parameters
-    ----------
-    folder
-        Of the report.
-    template
-        Page, see reporting.page; shows all tables and figures.
-    content
-        All there is to write; parts are put together by `|`.
-    sources
-        Checksums by the name of what the report was made from, see made_from: provenance.csv.
-    record
-        JSON file of what was written and drawn from what. A figure whose data and drawing code are
-        those of the record is not drawn again; a file of the record that is no longer made goes.
+    template : page, see reporting.page; shows all tables and figures.
+    sources : checksums by the name of what the report was made from: provenance.csv.
+    record : JSON file of what was written and drawn from what. A figure whose data and drawing code
+        are those of the record is not drawn again; a file of it that is no longer made goes.
 
-    Raises
-    ------
-    DataError
-        See reporting.page.render and the kinds of figures. Nothing is written then but figures.
+    Raises DataError, see reporting.page.render and the kinds; nothing but figures is written then.
     """
     page = render(template, content.tables, content.figures, content.values)
     texts, figures = dict(content.files), content.figures

@@ -81,27 +81,15 @@ def write_png(path: Path | str, build: Callable[..., Figure], *data: Any, **opti
             FigureCanvasAgg(figure).print_png(str(temporary), metadata={"Software": None})
 
 
-def looks(
-    names: Iterable[Any], suffixes: Sequence[str] = (), fixed: Mapping[Any, Look] | None = None
-) -> dict[Any, dict[str, Any]]:
+def looks(names: Iterable[Any], suffixes: Sequence[str] = ()) -> dict[Any, dict[str, Any]]:
     """Colour, line and marker by name: one hue a name, the same in every figure of a case.
 
-    Parameters
-    ----------
-    names
-        Methods, networks, trainers of the case, all of them in a fixed order.
-    suffixes
-        A name that ends with one of these has the hue of the name without it; its line and marker
-        are the next of DASHES and MARKERS for each suffix.
-    fixed
-        Looks of some names, which take no colour from the others.
+    names : methods, networks, trainers of the case, all of them in a fixed order.
+    suffixes : a name that ends with one of these has the hue of the name without it; its line and
+        marker are the next of DASHES and MARKERS for each suffix.
     """
-    fixed, found = fixed or {}, {}
-    bases: dict[str, int] = {}
+    found, bases = {}, dict[str, int]()
     for name in names:
-        if name in fixed:
-            found[name] = dict(fixed[name])
-            continue
         variant = next((k for k, s in enumerate(suffixes, 1) if str(name).endswith(s)), 0)
         base = str(name).removesuffix(suffixes[variant - 1]) if variant else str(name)
         number = bases.setdefault(base, len(bases))

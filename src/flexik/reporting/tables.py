@@ -100,6 +100,11 @@ def table(rows: pd.DataFrame | Sequence[Mapping], columns: Mapping[str, Any]) ->
     return Table(pd.DataFrame(found), {title: c.decimals for title, c in given.items()})
 
 
+def spread(values: pd.Series) -> dict[str, Any]:
+    """What hangs on the draw, of the values of all restarts."""
+    return {"least": values.min(), "median": values.median(), "largest": values.max()}
+
+
 def write_table(
     path_without_suffix: Path | str,
     frame: pd.DataFrame,

@@ -11,7 +11,7 @@ from flexik.cases.crane.parts.fields import STROKES
 from flexik.cases.crane.parts.samples import counts
 from flexik.cases.crane.report_figures import figures
 from flexik.cases.crane.report_results import REFERENCE, Results, read
-from flexik.cases.crane.report_tables import SPREAD, tables
+from flexik.cases.crane.report_tables import tables
 from flexik.cases.crane.section import Section
 from flexik.evaluation.errors import STATISTICS
 from flexik.kinematics.status import REACHED, STATUS_MEANING
@@ -50,10 +50,10 @@ def metrics(results: Results) -> dict[str, float]:
         lengths = {name: statistics[name] for name in STATISTICS}
         found |= _millimetres(label, lengths) | {f"{label}.n_failed": statistics["n_failed"]}
         if label in results.spread:
-            spread = results.spread[label][["mean_error", "max_error"]].agg(list(SPREAD))
-            lengths = {
-                f"{which}_{name}": spread[name][which] for name in spread for which in SPREAD
-            }
+            spread = results.spread[label][["mean_error", "max_error"]].agg(
+                ["min", "median", "max"]
+            )
+            lengths = {f"{k}_{name}": v for name in spread for k, v in spread[name].items()}
             found |= _millimetres(f"{label}.restarts", lengths)
         if at_random := results.workspace_statistics.get(label):
             lengths = {f"workspace_{k}": v for k, v in at_random.items() if k.endswith("_error")}

@@ -177,26 +177,18 @@ def _errors(results: Results) -> dict[str, Drawing]:
 
 
 def _comparison(results: Results) -> Drawing:
-    labels = list(results.statistics)
-    compared = results.compared(labels).T
-    whats, theirs = ("mean", "max"), [f"{label} published" for label in labels]
-    rows = [
-        pd.DataFrame(
-            {
-                "method": labels,
-                "what": what,
-                "ours": compared.loc[labels, f"{what}_error"].to_numpy(),
-                "published": compared.loc[theirs, f"{what}_error"].to_numpy(),
-            }
-        )
-        for what in whats
-    ]
+    labels, axes = list(results.statistics), {}
+    compared, rows = results.compared(labels), []
+    for what in ("mean", "max"):
+        axes[what] = Axis(f"{what} R (mm)", log=True)
+        values = compared.loc[f"{what}_error"].to_numpy()
+        columns = {"ours": values[::2], "published": values[1::2]}
+        rows.append(pd.DataFrame({"method": labels, "what": what, **columns}))
     return draw(
         kinds.beside,
-        *(pd.concat(rows, ignore_index=True), "method", "ours", "published"),
-        {what: Axis(f"{what} R (mm)", log=True) for what in whats},
+        *(pd.concat(rows, ignore_index=True), "method", "ours", "published", axes),
         panel="what",
-        titles=dict.fromkeys(whats, ""),
+        titles=dict.fromkeys(axes, ""),
         columns=2,
     )
 
@@ -287,33 +279,30 @@ def _cost(cost: pd.DataFrame, looks: Mapping) -> Drawing:
 
 
 def _sizes(results: Results) -> dict[str, Drawing]:
-    found = {}
-    published = {name: results.published_size(name) for name in results.studies}
+    if not results.studies:
+        return {}
+    frames = {name: sizes for name, (sizes, _) in results.studies.items()}
+    published = {name: results.published_size(name) for name in frames}
     chosen = {name: size for name, (_, size) in results.studies.items()}
-    for name, (sizes, size) in results.studies.items():
-        found[f"size_selection_{name}"] = draw(
-            kinds.sizes,
-            sizes,
-            chosen=size,
-            published=published[name],
-            titles=f"Choice: smallest size within {tolerance:g} % of the least selection error"
-            if (tolerance := 100 * results.section.networks[name].select.tolerance)
-            else "Choice: size of the least selection error",
-        )
-    if found:
-        frames = [sizes.assign(network=name) for name, (sizes, _) in results.studies.items()]
-        found["size_selections"] = draw(
-            kinds.sizes,
-            pd.concat(frames),
-            panel="network",
-            chosen=chosen,
-            published=published,
-            titles={
-                name: f"{name}\nchosen {size}, published {published[name] or 'none'}"
-                for name, size in chosen.items()
-            },
-            band=False,
-        )
+    found = {}
+    for name, sizes in frames.items():
+        tolerance = 100 * results.section.networks[name].select.tolerance
+        rule = f"smallest size within {tolerance:g} %" if tolerance else "size"
+        rule = f"Choice: {rule} of the least selection error"
+        options = {"chosen": chosen[name], "published": published[name], "titles": rule}
+        found[f"size_selection_{name}"] = draw(kinds.sizes, sizes, **options)
+    found["size_selections"] = draw(
+        kinds.sizes,
+        pd.concat([sizes.assign(network=name) for name, sizes in frames.items()]),
+        panel="network",
+        chosen=chosen,
+        published=published,
+        titles={
+            name: f"{name}\nchosen {size}, published {published[name] or 'none'}"
+            for name, size in chosen.items()
+        },
+        band=False,
+    )
     return found
 
 

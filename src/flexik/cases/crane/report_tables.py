@@ -10,7 +10,7 @@ from flexik.learning.size_rules import haykin, haykin_samples, oja
 from flexik.positioning.inverted_network import InvertedSettings
 from flexik.reporting import style
 from flexik.reporting.style import MM
-from flexik.reporting.tables import Column, Table, mm, table
+from flexik.reporting.tables import Column, Table, mm, spread, table
 
 # As in the thesis' table of simulated positioning errors
 STATISTIC_NAMES = {
@@ -25,7 +25,6 @@ COUNT_NAMES = {"n_conditions": "conditions", "n_failed": "failed conditions"}
 PUBLISHED_TOLERANCE = 1e-7  # of the thesis' table of errors
 RACE_TIMES = (0.1, 1.0, 10.0, 60.0)  # s
 ERROR_FRACTION = 0.1  # share of wrong answers permitted in equation 58
-SPREAD = {"min": "least", "median": "median", "max": "largest"}
 SIZES = {
     "n hidden": "n_hidden",
     **{
@@ -157,12 +156,12 @@ def _without_worst(results: Results) -> Table:
 def _restarts(results: Results) -> Table:
     """Errors with the network that was chosen, and the spread over all restarts of its training."""
     rows = []
-    for label, spread in results.spread.items():
-        row: dict[str, Any] = {"method": label, "starts": len(spread)}
+    for label, errors in results.spread.items():
+        row: dict[str, Any] = {"method": label, "starts": len(errors)}
         for what in ("mean", "max"):
             row[f"{what} R (mm)"] = MM * results.statistics[label][f"{what}_error"]
-            for which, name in SPREAD.items():
-                row[f"{name} {what} R"] = MM * spread[f"{what}_error"].agg(which)
+            found = spread(MM * errors[f"{what}_error"])
+            row |= {f"{which} {what} R": value for which, value in found.items()}
         rows.append(row)
     return Table(pd.DataFrame(rows))
 
