@@ -9,6 +9,7 @@ import pandas as pd
 from flexik.cases.case import load
 from flexik.cases.crane.parts.fields import SAMPLE_FIELDS
 from flexik.kinematics.crane_manipulator import CraneManipulator
+from flexik.machines.crane import Magnitudes
 from flexik.multibody.crane.assembly import flexible_crane
 
 ROOT = Path(__file__).parents[1]
@@ -35,3 +36,8 @@ def samples(columns):
 
 
 MANIPULATOR = CraneManipulator(section().machine.geometry)
+
+
+def magnitudes(*sizes):
+    """How far a crane may be off, whatever the sizes."""
+    return Magnitudes.model_construct(**dict(zip(Magnitudes.model_fields, sizes, strict=True)))

@@ -32,7 +32,7 @@ from flexik.kinematics.crane import forward, inverse_with_smallest_extension, po
 from flexik.kinematics.crane_dimensions import corrected
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.status import REACHED
-from flexik.multibody.crane.as_built import Magnitudes, as_built_tips, draw_twin
+from flexik.multibody.crane.as_built import as_built_tips, draw_twin
 from flexik.multibody.crane.model import equilibrium, tips
 from flexik.multibody.crane.statics import JOINTS, compliance, joint_forces
 from flexik.positioning.combined import Combined
@@ -305,14 +305,14 @@ class Exact:
 
 
 def test_few_measurements_of_an_as_built_crane_halve_the_error(crane):
-    magnitudes = Magnitudes(0.5e-3, 0.5e-3, 0.1e-3, 0.3, 0.5e-3, 0.05e-3, 0.05, 0.1)
+    sizes = crane_case.magnitudes(0.5e-3, 0.5e-3, 0.1e-3, 0.3, 0.5e-3, 0.05e-3, 0.05, 0.1)
     small = dict.fromkeys(("pivot", "length", "stroke_offset"), 0.5e-3)
     expected = changed(**small, repeatability=0.05e-3, play=0.1e-3, play_deviation=0.03e-3)
     network, errors = Exact(crane), []
     nominal = baseline(crane, network)
     for seed in range(3):
         generator = np.random.default_rng(seed)
-        twin = draw_twin(crane, magnitudes, seed)
+        twin = draw_twin(crane, sizes, seed)
         targets, payload = area(crane, generator, 9)
         strokes = asked(nominal, targets, payload).values
         tip = as_built_tips(twin, strokes, payload, generator)

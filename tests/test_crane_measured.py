@@ -22,7 +22,7 @@ from flexik.errors import FlexikError
 from flexik.evaluation.conditions import every
 from flexik.kinematics.crane import inverse_with_smallest_extension, pose
 from flexik.kinematics.status import REACHED
-from flexik.multibody.crane.as_built import Magnitudes, as_built_tips, draw_twin
+from flexik.multibody.crane.as_built import as_built_tips, draw_twin
 from flexik.multibody.crane.model import equilibrium
 from flexik.positioning.combined import Settings
 from flexik.positioning.method import Answer
@@ -34,7 +34,7 @@ GEOMETRY = NOMINAL.geometry
 SECTION = crane_case.section()
 MEASURED = SECTION.studies.measured
 METHOD = Uncompensated(crane_case.MANIPULATOR)
-NO_ERRORS = Magnitudes(*[0.0] * 8)
+NO_ERRORS = crane_case.magnitudes(*[0.0] * 8)
 POINTS = np.array([[2.2, 0.95], [2.2, 0.15], [3.8, 0.95]])
 
 
@@ -71,8 +71,7 @@ def test_errors_of_a_crane_as_built_are_those_of_its_tips():
     table = pd.DataFrame(adaptation.errors_of(still, 2))
     targets = table[:4][["target_x", "target_y"]].to_numpy()
     strokes = inverse_with_smallest_extension(GEOMETRY, targets).values
-    magnitudes = Magnitudes(**still.campaign.deviations.model_dump())
-    twin = draw_twin(NOMINAL, magnitudes, still.adaptation.seed + 2)
+    twin = draw_twin(NOMINAL, still.campaign.deviations, still.adaptation.seed + 2)
     tips = as_built_tips(twin, strokes, table["payload"].to_numpy()[:4])
     expected = np.linalg.norm(tips - targets, axis=1)
     np.testing.assert_allclose(table["error"][:8], np.tile(expected, 2), atol=1e-9)
@@ -99,15 +98,15 @@ def test_targets_out_of_reach_are_told(changed, message):
 
 
 def test_the_budget_has_every_deviation_alone_and_larger():
-    given = Magnitudes(1e-3, 2e-3, 3e-4, 0.3, 4e-3, 5e-4, 0.03, 0.05)
+    given = crane_case.magnitudes(1e-3, 2e-3, 3e-4, 0.3, 4e-3, 5e-4, 0.03, 0.05)
     kinds = budget.kinds(given, 3.0)
     assert list(kinds)[:4] == [("none", 1.0), ("all", 1.0), ("pivot", 0.0), ("pivot", 3.0)]
     assert len(kinds) == 2 + 2 * 7
     assert kinds["all", 1.0] == given
     assert kinds["none", 1.0] == NO_ERRORS
-    assert kinds["play", 0.0] == Magnitudes(0, 0, 3e-4, 0.3, 0, 0, 0, 0)
-    assert kinds["length", 0.0] == Magnitudes(0, 2e-3, 0, 0, 0, 0, 0, 0)
-    assert kinds["length", 3.0] == dataclasses.replace(given, length=3 * 2e-3)
+    assert kinds["play", 0.0] == crane_case.magnitudes(0, 0, 3e-4, 0.3, 0, 0, 0, 0)
+    assert kinds["length", 0.0] == crane_case.magnitudes(0, 2e-3, 0, 0, 0, 0, 0, 0)
+    assert kinds["length", 3.0] == given.model_copy(update={"length": 3 * 2e-3})
 
 
 def test_the_budget_counts_errors_from_targets_and_from_the_reference():

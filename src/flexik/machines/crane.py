@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flexik.parameters.model import Count, Interval, Model, NotNegative, Positive, Vector
+from flexik.parameters.model import Count, Interval, Model, NotNegative, Positive, Share, Vector
 
 # Lengths closer than this are the same, m
 LENGTH_TOLERANCE = 1e-9
@@ -125,3 +125,32 @@ class Machine(Model):
             if getattr(self.structure, name).centre_of_mass > length:
                 raise ValueError(f"structure.{name}.centre_of_mass: beyond its length, {length} m")
         return self
+
+
+# Beyond these a number is in another unit, or slipped
+Length = Annotated[float, Field(ge=0, le=0.02)]  # m
+Clearance = Annotated[float, Field(ge=0, le=0.005)]  # m
+Relative = Annotated[float, Field(ge=0, le=0.5)]
+
+
+class Magnitudes(Model):
+    """How far a crane as built may be off. Standard deviations, but for `play`.
+
+    pivot : of every coordinate of every pin, in the frame of its body, m.
+    length : of cylinders at zero stroke, rocker and coupler, m.
+    play : median radial clearance of a pin, m.
+    play_spread : of the logarithm of the clearances.
+    stroke_offset : of the constant error of a stroke sensor, m.
+    repeatability : of what a stroke differs from one approach to the next, m.
+    section : of the logarithm of the bending stiffness of a beam.
+    spring : of the logarithm of the stiffness of the ground spring.
+    """
+
+    pivot: Length
+    length: Length
+    play: Clearance
+    play_spread: Share
+    stroke_offset: Length
+    repeatability: Clearance
+    section: Relative
+    spring: Relative

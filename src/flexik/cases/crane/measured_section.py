@@ -4,6 +4,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from flexik.machines.crane import Clearance, Length, Magnitudes, Relative
 from flexik.parameters.conditions import Points
 from flexik.parameters.model import (
     Count,
@@ -12,28 +13,10 @@ from flexik.parameters.model import (
     Name,
     NotNegative,
     Seed,
-    Share,
     check_increase,
 )
 
-# Beyond these a number is in another unit, or slipped
-Length = Annotated[float, Field(ge=0, le=0.02)]  # m
-Clearance = Annotated[float, Field(ge=0, le=0.005)]  # m
-Relative = Annotated[float, Field(ge=0, le=0.5)]
 Known = Field(gt=0)  # an expectation of zero would leave nothing to identify
-
-
-class Deviations(Model):
-    """How far a crane may be off, see multibody.crane.as_built.Magnitudes."""
-
-    pivot: Length
-    length: Length
-    play: Clearance
-    play_spread: Share
-    stroke_offset: Length
-    repeatability: Clearance
-    section: Relative
-    spring: Relative
 
 
 class Campaign(Points):
@@ -47,7 +30,7 @@ class Campaign(Points):
     file: str | None = None
     method: Name = "combined"
     noise: Length
-    deviations: Deviations
+    deviations: Magnitudes
     seed: Seed = 1
 
     @model_validator(mode="after")

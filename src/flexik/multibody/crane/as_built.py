@@ -5,14 +5,14 @@ the side of its hole to which its force pushes it.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from flexik.errors import ParameterError, SolverError
 from flexik.kinematics.crane import check_assembly
 from flexik.kinematics.crane_dimensions import LENGTHS, VECTORS, corrected
-from flexik.machines.crane import CraneGeometry
+from flexik.machines.crane import CraneGeometry, Magnitudes
 from flexik.multibody.beams import Array
 from flexik.multibody.crane.model import PIVOTS, RODS, CraneModel, listed, solve
 from flexik.multibody.crane.statics import joint_forces
@@ -47,38 +47,6 @@ SWEEPS = 200
 
 # Radial clearance (half the difference of hole and pin) of each of PINS, m
 Play = Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class Magnitudes:
-    """How far a crane may be off. Standard deviations, but for `play`.
-
-    pivot : of every coordinate of every pin, in the frame of its body, m.
-    length : of cylinders at zero stroke, rocker and coupler, m.
-    play : median radial clearance of a pin, m.
-    play_spread : of the logarithm of the clearances.
-    stroke_offset : of the constant error of a stroke sensor, m.
-    repeatability : of what a stroke differs from one approach to the next, m.
-    section : of the logarithm of the bending stiffness of a beam.
-    spring : of the logarithm of the stiffness of the ground spring.
-
-    Raises ParameterError if one is negative or not finite.
-    """
-
-    pivot: float
-    length: float
-    play: float
-    play_spread: float
-    stroke_offset: float
-    repeatability: float
-    section: float
-    spring: float
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not 0.0 <= value < np.inf:
-                raise ParameterError(f"{field.name}: expected zero or a positive size, got {value}")
 
 
 @dataclass(frozen=True)

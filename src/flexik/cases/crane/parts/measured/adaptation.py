@@ -20,7 +20,6 @@ from flexik.kinematics.crane import smallest_extension
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.status import REACHED
 from flexik.machines.crane import CraneGeometry, Machine
-from flexik.multibody.crane.as_built import Magnitudes
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning import combined
 from flexik.positioning.method import Array, Method, Network, PositioningError
@@ -72,8 +71,7 @@ def prepare(
 def errors_of(study: Study, number: int) -> Columns:
     """Errors on crane `number`, of the methods of the nominal crane and adapted."""
     settings, crane = study.adaptation, study.crane
-    magnitudes = Magnitudes(**study.campaign.deviations.model_dump())
-    twin, generator = twin_and_generator(crane, magnitudes, settings.seed + number)
+    twin, generator = twin_and_generator(crane, study.campaign.deviations, settings.seed + number)
     most = settings.n_measurements[-1]
     query = drawn(crane.geometry, settings, most + settings.n_targets, generator)
     learn, judge = query[:most], query[most:]

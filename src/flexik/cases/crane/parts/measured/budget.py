@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +16,7 @@ from flexik.cases.crane.parts.measured.nominal import approaches, read_network
 from flexik.cases.crane.parts.measured.twins import measured_tips, twin_and_generator
 from flexik.datasets.parts import Columns, Work, Writer, stacked, table
 from flexik.learning.storage import load_restarts
-from flexik.machines.crane import Machine
-from flexik.multibody.crane.as_built import Magnitudes
+from flexik.machines.crane import Machine, Magnitudes
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning import combined
 from flexik.positioning.method import Array
@@ -60,7 +59,7 @@ def prepare(
     `.restarts.parquet` is one of cranes without deviations, each compensated by the network of
     another of the `restarts` of which `network` is the best; `twin` is the restart.
     """
-    crane, given = flexible(machine, spring), Magnitudes(**campaign.deviations.model_dump())
+    crane, given = flexible(machine, spring), campaign.deviations
     strokes, query = approaches(crane, method, read_network(network), campaign)
     items = [Item(k, kinds(given, budget.factor), strokes) for k in range(budget.n_cranes)]
     others = {} if restarts is None else load_restarts(restarts)
@@ -78,7 +77,7 @@ def prepare(
 
 def kinds(given: Magnitudes, factor: float) -> dict[tuple[str, float], Magnitudes]:
     """No deviation, all, each alone (factor 0), and each `factor` times as large among all."""
-    sizes = asdict(given)
+    sizes = given.model_dump()
     none = dict.fromkeys(sizes, 0.0)
     found = {("none", 1.0): none, ("all", 1.0): sizes}
     for name in sizes:
@@ -86,7 +85,7 @@ def kinds(given: Magnitudes, factor: float) -> dict[tuple[str, float], Magnitude
             own = {key: size for key, size in sizes.items() if BELONGS.get(key, key) == name}
             found[name, 0.0] = none | own
             found[name, factor] = sizes | {name: factor * sizes[name]}
-    return {kind: replace(given, **changed) for kind, changed in found.items()}
+    return {kind: given.model_copy(update=changed) for kind, changed in found.items()}
 
 
 def errors_of(study: Study, item: Item) -> Columns:

@@ -17,7 +17,6 @@ from flexik.cases.crane.parts.measured.nominal import approaches, read_network
 from flexik.cases.crane.parts.measured.twins import measured_tips, twin_and_generator
 from flexik.datasets.parts import Work, Writer, table, whole
 from flexik.machines.crane import Machine
-from flexik.multibody.crane.as_built import Magnitudes
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning import combined
 from flexik.positioning.method import Array
@@ -49,8 +48,7 @@ def measure(
     *, crane: FlexibleCrane, campaign: Campaign, strokes: Mapping[str, Array], query: Array
 ) -> Mapping[str, Writer]:
     """The table of the campaign on a crane as built."""
-    magnitudes = Magnitudes(**campaign.deviations.model_dump())
-    twin, generator = twin_and_generator(crane, magnitudes, campaign.seed)
+    twin, generator = twin_and_generator(crane, campaign.deviations, campaign.seed)
     tips = measured_tips(twin, strokes, query[:, 2], campaign.noise, generator)
     n = len(query)
     numbers = np.vstack([np.hstack([query, strokes[name], tips[name]]) for name in strokes])

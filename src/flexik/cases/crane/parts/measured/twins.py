@@ -5,9 +5,9 @@ from typing import TypeVar
 
 import numpy as np
 
+from flexik.machines.crane import Magnitudes
 from flexik.multibody.crane.as_built import (
     AsBuiltCrane,
-    Magnitudes,
     actual_strokes,
     draw_twin,
     settled_tips,
