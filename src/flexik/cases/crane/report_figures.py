@@ -250,12 +250,15 @@ def _tolerances(ours: pd.DataFrame, theirs: pd.DataFrame, looks: Mapping) -> Dra
 
 def _cost(cost: pd.DataFrame, looks: Mapping) -> Drawing:
     """Mean error of every method against what a target costs it."""
-    times = {"single (us)": "alone", "batched (us)": "batch"}
-    keys = ["method", "mean R (mm)"]
-    time = cost.melt(keys, list(times), "how", "cost").replace({"how": times}).assign(panel="time")
-    counts = cost[[*keys, "operations"]].rename(columns={"operations": "cost"})
-    counts = counts.assign(panel="operations")
-    alone, batch = (time[time["how"] == how] for how in times.values())
+    counts, alone, batch = (
+        cost[["method", "mean R (mm)"]].assign(cost=cost[name], panel=panel)
+        for panel, name in (
+            ("operations", "operations"),
+            ("time", "single (us)"),
+            ("time", "batched (us)"),
+        )
+    )
+    time = pd.concat([alone, batch])
     grey, dot = {"color": style.GREY, "linewidth": 0.8, "zorder": 1.5}, {"markersize": 6.5}
     white = dot | {"markerfacecolor": "white"}
     return draw(

@@ -1,6 +1,6 @@
 """The crane drawn: links and pins of rigid poses, and the loaded crane over its rigid pose."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -112,9 +112,7 @@ def crane(geometry: CraneGeometry, shape: Mapping[str, Any]) -> Drawing:
     return draw(
         chart,
         *_rigid(rigid, rigid_pins),
-        *_ground(bent["pillar"][0]),
-        *_beams(bent, pins),
-        *_cylinders(geometry, pins),
+        *_loaded(geometry, bent, pins),
         *_points(tips, bent, pins),
         _texts([("rigid tip", tips[0], (9.0, 7.0), "left")]),
         *_labels(bent, pins, strokes, angle, float(shape["payload"])),
@@ -184,51 +182,43 @@ def _layer(points: Any, mark: str, **look: Any) -> Layer:
     return Layer(frame, "x", "y", mark, label="", look=look)
 
 
-def _rigid(axes: Points, pins: Points) -> list[Layer]:
+def _rigid(axes: Points, pins: Points) -> Iterator[Layer]:
     pale = {"color": "#F0F0F0", "edgecolor": style.GREY, "linewidth": 0.8, "zorder": 1}
-    grey = {"color": style.GREY, "linewidth": 0.8, "zorder": 1}
-    rods = [[pins[letter] for letter in letters] for letters in ("CD", "EH", "FHI")]
-    outlines = [_outline(axes[name], half) for name, (_, half) in BEAMS.items()]
-    bodies = [_layer(outline, "area", **pale) for outline in outlines]
-    return bodies + [_layer(rod, "-", **grey) for rod in rods]
+    for name, (_, half) in BEAMS.items():
+        yield _layer(_outline(axes[name], half), "area", **pale)
+    for rod in ("CD", "EH", "FHI"):
+        corners = [pins[letter] for letter in rod]
+        yield _layer(corners, "-", color=style.GREY, linewidth=0.8, zorder=1)
 
 
-def _ground(foot: Array) -> list[Layer]:
-    """Ground at the flange, and the torsion spring that holds the pillar."""
-    turns = np.linspace(0.0, 5 * np.pi, 200)[:, None]
+def _loaded(geometry: CraneGeometry, bent: Points, pins: Points) -> Iterator[Layer]:
+    # the torsion spring that holds the pillar, and the ground at the flange
+    turns, foot = np.linspace(0.0, 5 * np.pi, 200)[:, None], bent["pillar"][0]
     spiral = foot + (0.012 + 0.013 * turns) * np.hstack([np.cos(turns), np.sin(turns)])
+    yield _layer(spiral, "-", color=style.PURPLE, linewidth=2, zorder=6)
     left, low = foot - [0.55, 0.24]
     hatch = [[[x, low], [x - 0.1, low - 0.12]] for x in np.linspace(left + 0.1, left + 1.1, 10)]
-    lines = [[[left, low], [left + 1.1, low]], *hatch]
-    ground = [_layer(line, "-", linewidth=1.0, color=style.INK, zorder=2) for line in lines]
-    return [_layer(spiral, "-", color=style.PURPLE, linewidth=2, zorder=6), *ground]
-
-
-def _beams(bent: Points, pins: Points) -> list[Layer]:
-    """Beams, and the rigid arms from their axes to pins beside them."""
-    found = []
+    for line in [[[left, low], [left + 1.1, low]], *hatch]:
+        yield _layer(line, "-", linewidth=1.0, color=style.INK, zorder=2)
     for name, (colour, half) in BEAMS.items():
-        axis, look, level = bent[name], {"color": colour}, 2.8 if name == "extension" else 3.0
-        for letter, (_, beam, _) in PINS.items():
+        level = 2.8 if name == "extension" else 3.0
+        for letter, (_, beam, _) in PINS.items():  # rigid arms from the axis to pins beside it
             if beam == name or (name == "jib" and letter == "G"):
-                arm = [_foot(axis, pins[letter])[2], pins[letter]]
-                found.append(_layer(arm, "-", linewidth=9, zorder=level - 0.1, **look))
-        found.append(_layer(_outline(axis, half), "area", zorder=level, **look))
+                arm = [_foot(bent[name], pins[letter])[2], pins[letter]]
+                yield _layer(arm, "-", linewidth=9, zorder=level - 0.1, color=colour)
+        yield _layer(_outline(bent[name], half), "area", zorder=level, color=colour)
+    hidden = [bent["extension"][0], bent["jib"][-1]]
     dashed = {"color": "white", "linewidth": 1.0, "linestyle": (0, (5, 4)), "zorder": 3.1}
-    return [*found, _layer([bent["extension"][0], bent["jib"][-1]], "-", **dashed)]
-
-
-def _cylinders(geometry: CraneGeometry, pins: Points) -> list[Layer]:
-    """Cylinders, rocker and coupler."""
-    found, dark = [], {"color": "#3D3D3D", "solid_capstyle": "butt"}
+    yield _layer(hidden, "-", **dashed)
     lengths = geometry.lift_cylinder_length, geometry.jib_cylinder_length
     for ends, length in zip(("CD", "EH"), lengths, strict=True):
         start, end = (pins[letter] for letter in ends)
         barrel = start + 0.9 * length * (end - start) / np.hypot(*(end - start))
-        found.append(_layer([start, end], "-", color="#A6A6A6", linewidth=4, zorder=4))
-        found.append(_layer([start, barrel], "-", linewidth=8, zorder=4.1, **dark))
-    rods = [pins[letter] for letter in "FHI"]
-    return [*found, _layer(rods, "-", color=style.GREEN, linewidth=6, zorder=4.2)]
+        dark = {"color": "#3D3D3D", "solid_capstyle": "butt"}
+        yield _layer([start, end], "-", color="#A6A6A6", linewidth=4, zorder=4)
+        yield _layer([start, barrel], "-", linewidth=8, zorder=4.1, **dark)
+    rocker = [pins[letter] for letter in "FHI"]
+    yield _layer(rocker, "-", color=style.GREEN, linewidth=6, zorder=4.2)
 
 
 def _points(tips: list[Array], bent: Points, pins: Points) -> list[Layer]:
