@@ -106,8 +106,9 @@ class Results:
         every, published = self.of("studies/fit.restarts"), read_csv(PUBLISHED, R, ("network",))
         rows = chosen(every).set_index("network").loc[list(self.section.gauge_networks)]
         rows = rows.join(published.set_index("network")[R].add_prefix("published_"))
-        least, most = (getattr(every.groupby("network")[R], which)() for which in ("min", "max"))
-        rows = rows.join(least.add_prefix("worst_")).join(most.add_prefix("best_"))
+        starts = every.groupby("network")
+        rows = rows.join(starts[R].min().add_prefix("worst_"))
+        rows = rows.join(starts[R].max().add_prefix("best_"))
         networks = [self.section.networks[str(name)] for name in rows.index]
         rows["hidden"] = [self.hidden(str(name)) for name in rows.index]
         rows["trainer"] = [network.trainer for network in networks]
@@ -115,9 +116,7 @@ class Results:
             network.readings.replace("_", "-") + EXTRA.get(str(network.learns), "")
             for network in networks
         ]
-        rows["mean_errors"] = [
-            by_restart(every.loc[every["network"] == name, "mean_error"], 2) for name in rows.index
-        ]
+        rows["mean_errors"] = starts["mean_error"].agg(by_restart, 2)
         rows[[f"targets_{r}" for r in R]] = np.nan
         right = self.of(f"samples/{self.conditions}")[list(ANGLES)].to_numpy()
         for label, method in self.section.methods.items():

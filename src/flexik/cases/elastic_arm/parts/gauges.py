@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flexik.cases.elastic_arm.parts.readings import deformation_fields
 from flexik.cases.elastic_arm.section import Machine
 from flexik.datasets.tables import Field
 
@@ -48,15 +49,7 @@ FIELDS = (
         for gauge in (1, 2, 3)
     ),
     *(Field(f"strain_{link}", "1", f"axial strain of link {link}") for link in (1, 2)),
-    *(
-        Field(f"{name}_{link}", unit, f"{meaning} of link {link}, by its gauges")
-        for link in (1, 2)
-        for name, unit, meaning in (
-            ("dy", "m", "deflection across the tip"),
-            ("dx", "m", "elongation"),
-            ("dphi", "rad", "rotation of the tip"),
-        )
-    ),
+    *deformation_fields("by the gauges"),
     Field("p_x", "m", "tip, forward, by equation 44 from the gauges"),
     Field("p_y", "m", "tip, upward, by equation 45 from the gauges"),
 )

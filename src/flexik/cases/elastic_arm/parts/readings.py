@@ -7,11 +7,22 @@ from numpy.typing import NDArray
 
 from flexik.cases.elastic_arm.section import DegreeAxis, Samples
 from flexik.datasets.tables import Field
+from flexik.kinematics.elastic_arm import DEFORMATION
 
 Array = NDArray[np.float64]
 
 TRAINING, SELECTION, HELD_OUT = "training", "selection", "held_out"
 ANGLES = ("theta_1", "theta_2")
+
+
+def deformation_fields(source: str) -> tuple[Field, ...]:
+    """Fields of DEFORMATION, told by `source`."""
+    meanings = 2 * ("deflection across", "displacement along", "rotation of")
+    return tuple(
+        Field(name, "rad" if "phi" in name else "m", f"{of} the end of link {name[-1]}, {source}")
+        for name, of in zip(DEFORMATION, meanings, strict=True)
+    )
+
 
 PAYLOAD = Field("payload", "kg", "point mass at the tip")
 # What methods are asked for
@@ -29,23 +40,11 @@ FIELDS = (
     Field("rigid_y", "m", "tip of the rigid arm, upward"),
     Field("tip_x", "m", "tip of the flexible model, forward"),
     Field("tip_y", "m", "tip of the flexible model, upward"),
-    *(
-        Field(f"{name}_{link}", unit, f"{meaning} link {link}, of the model")
-        for link in (1, 2)
-        for name, unit, meaning in (
-            ("dy", "m", "deflection across the end of"),
-            ("dx", "m", "displacement along the end of"),
-            ("dphi", "rad", "rotation of the end of"),
-        )
-    ),
-    *(
-        Field(f"station_deflection_{link}", "m", f"deflection at gauge 3 of link {link}")
-        for link in (1, 2)
-    ),
-    *(
-        Field(f"axial_strain_{link}", "1", f"at the pair of gauges of link {link}")
-        for link in (1, 2)
-    ),
+    *deformation_fields("by the model"),
+    Field("station_deflection_1", "m", "deflection at gauge 3 of link 1"),
+    Field("station_deflection_2", "m", "deflection at gauge 3 of link 2"),
+    Field("axial_strain_1", "1", "at the pair of gauges of link 1"),
+    Field("axial_strain_2", "1", "at the pair of gauges of link 2"),
 )
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from flexik.cases.smartee.parts.train import lesson, queries_and_answers
-from flexik.datasets.parts import Work, Writer, json_file, whole
+from flexik.datasets.parts import Work, json_file, whole
 from flexik.learning.perceptron import Array, Network, Normalisation
 from flexik.learning.starts import from_starts
 from flexik.learning.training import Architecture
@@ -39,13 +39,9 @@ def peak(network: Network, inputs: Array, outputs: Array) -> float:
 
 
 def prepare_linear(*, rows: Path) -> Work:
-    """What a network comes to whose hidden units all stay in their linear part."""
-    return whole(linear, rows=rows)
-
-
-def linear(rows: Path) -> dict[str, Writer]:
-    """The error of the best linear map of the poses in `rows`."""
-    return {".json": json_file({"mean_squared_error": linear_error(*queries_and_answers(rows))})}
+    """The error of a network whose hidden units stay in their linear part."""
+    error = linear_error(*queries_and_answers(rows))
+    return whole(lambda: {".json": json_file({"mean_squared_error": error})})
 
 
 def linear_error(inputs: Array, outputs: Array) -> float:
