@@ -1,7 +1,6 @@
 """Figures of a measuring campaign and of what a few measurements teach (Rouvinen 1999, 4.6)."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -34,13 +33,17 @@ def campaign_figures(
     pushes : (k,) whether its jib cylinder pushes there.
     """
     points = errors.drop_duplicates("point")[TARGET].to_numpy()
-    found = {"measured_points": _points(geometry, strokes, points, pushes)}
-    for origin in ("", "reference_"):
-        for axis in "xy":
-            found[f"measured_{origin}errors_{axis}"] = _errors(errors, f"{origin}error_{axis}")
-    for number, target in enumerate(named_points(points), start=1):
-        found[f"measured_point_{number}"] = _achieved(errors, target)
-    return found
+    columns = [f"{origin}error_{axis}" for origin in ("", "reference_") for axis in "xy"]
+    return {
+        "measured_points": _points(geometry, strokes, points, pushes),
+        **{
+            f"measured_{name.replace('error', 'errors')}": _errors(errors, name) for name in columns
+        },
+        **{
+            f"measured_point_{number}": _achieved(errors, target)
+            for number, target in enumerate(named_points(points), start=1)
+        },
+    }
 
 
 def named_points(points: np.ndarray) -> np.ndarray:
@@ -61,21 +64,21 @@ def _points(
     low, high = corners.min(axis=0) - MARGIN, corners.max(axis=0) + MARGIN
     lines = (np.arange(a + RASTER / 2, b, RASTER) for a, b in zip(low, high, strict=True))
     raster = np.stack(np.meshgrid(*lines), axis=-1).reshape(-1, 2)
-    area = pd.DataFrame(
-        raster[np.isfinite(smallest_extension(geometry, raster))], columns=["x", "y"]
-    )
+    inside = raster[np.isfinite(smallest_extension(geometry, raster))]
+    area = pd.DataFrame(inside, columns=["x", "y"])
     dots = pd.DataFrame(points, columns=["x", "y"]).assign(text=np.arange(1, len(points) + 1))
-    dots = dots.assign(does=np.where(pushes, "jib cylinder pushes", "jib cylinder pulls"))
+    does = "jib cylinder pulls", "jib cylinder pushes"
+    dots["does"] = np.where(pushes, does[1], does[0])
     pale = {"color": "#F0F0F0", "markersize": 3.6, "markeredgewidth": 0, "zorder": 0}
     looks = {
-        "jib cylinder pulls": {"color": style.INK, "markeredgecolor": "white"},
-        "jib cylinder pushes": {"color": style.INK, "markerfacecolor": "white"},
+        does[0]: {"color": style.INK, "markeredgecolor": "white"},
+        does[1]: {"color": style.INK, "markerfacecolor": "white"},
     }
     number = {"fontsize": 9.5, "fontweight": "bold", "path_effects": []}
     numbers = [
-        Layer(dots[pushes == white], "x", "y", "text", text="text", look=number | {"color": colour})
-        for white, colour in ((True, style.INK), (False, "white"))
-        if (pushes == white).any()
+        Layer(rows, "x", "y", "text", text="text", look=number | {"color": colour})
+        for name, colour in ((does[1], style.INK), (does[0], "white"))
+        if len(rows := dots[dots["does"] == name])
     ]
     return draw(
         chart,
@@ -123,15 +126,13 @@ def _achieved(errors: pd.DataFrame, target: np.ndarray) -> Drawing:
     rows = errors[(errors[TARGET] == target).all(axis=1)]
     rows = rows.assign(x=-rows["error_x"], y=-rows["error_y"])
     layers = []
-    for method, mark, face in (("none", "--", "white"), ("combined", "-", None)):
-        of_method = rows[rows["method"] == method]
-        path = {"color": style.GREY, "linewidth": 0.9, "marker": "o", "markersize": 7}
-        dot: dict[str, Any] = {"markersize": 8, "markeredgewidth": 1.8}
-        if face:
-            path["markerfacecolor"] = dot["markerfacecolor"] = face
+    for method, mark, face in (("none", "--", {"markerfacecolor": "white"}), ("combined", "-", {})):
+        of_method, label = rows[rows["method"] == method], "" if face else "{:g} kg"
+        path = {"color": style.GREY, "linewidth": 0.9, "marker": "o", "markersize": 7, **face}
+        dot = {"markersize": 8, "markeredgewidth": 1.8, **face}
         layers += [
             Layer(of_method, "x", "y", f"o{mark}", label=TITLES[method], look=path),
-            Layer(of_method, "x", "y", "o", "payload", label="" if face else "{:g} kg", look=dot),
+            Layer(of_method, "x", "y", "o", "payload", label=label, look=dot),
         ]
     cross = {"color": style.INK, "markersize": 18, "markeredgewidth": 1.6}
     origin = pd.DataFrame({"x": [0.0], "y": [0.0]})
@@ -167,32 +168,23 @@ def adaptation(adapted: pd.DataFrame, goals: Mapping[int, float]) -> Drawing:
     spread = own.groupby(keys)["error"].agg(["mean", "min", "max"]).reset_index()
     wrong = long[long["method"] == MISJUDGED].groupby(keys)["error"].mean().reset_index()
     named = spread.assign(text=[f"{MM * v:.1f}" for v in spread["mean"]], dx=-2.0, dy=-10.0)
-    numbers = sorted(set(long["n_measurements"]))
+    named, numbers = named.assign(side="right"), sorted(set(long["n_measurements"]))
+    at, cranes = "n_measurements", "from the best crane to the worst"
+    sky, small = {"color": style.SKY, "alpha": 0.3}, {"fontsize": 8.5, "path_effects": []}
+    square = {"color": style.ORANGE, "markersize": 5.5, "fillstyle": "none"}
+    marked = {"color": style.VERMILION, "linewidth": 0.9, "marker": "v", "markevery": [1]}
     layers = [
-        Layer(
-            *(spread, "n_measurements", "min", "band"),
-            label="from the best crane to the worst",
-            look={"color": style.SKY, "alpha": 0.3},
-            to="max",
-        ),
-        Layer(spread, "n_measurements", "mean", "o-", label="mean over the cranes"),
-        Layer(
-            *(named.assign(side="right"), "n_measurements", "mean", "text"),
-            text="text",
-            look={"fontsize": 8.5, "path_effects": []},
-        ),
+        Layer(spread, at, "min", "band", to="max", label=cranes, look=sky),
+        Layer(spread, at, "mean", "o-", label="mean over the cranes"),
+        Layer(named, at, "mean", "text", text="text", look=small),
     ]
     if len(wrong):
-        open_square = {"color": style.ORANGE, "markersize": 5.5, "fillstyle": "none"}
-        label = "mean, misjudged"
-        layers.append(Layer(wrong, "n_measurements", "error", "s", label=label, look=open_square))
+        layers.append(Layer(wrong, at, "error", "s", label="mean, misjudged", look=square))
+    width = GOAL_WIDTH * numbers[-1]  # short: a goal is for its number only
     for k, (number, goal) in enumerate(goals.items()):
-        width = GOAL_WIDTH * numbers[-1]  # short: it is a goal for this number only
-        line = pd.DataFrame({"n": [number - width, number, number + width], "error": goal})
+        line = pd.DataFrame({at: [number - width, number, number + width], "error": goal})
         line["panel"] = "mean_error"
-        look = {"color": style.VERMILION, "linewidth": 0.9, "marker": "v", "markevery": [1]}
-        label = "" if k else "goal"
-        layers.append(Layer(line, "n", "error", "-", label=label, look=look))
+        layers.append(Layer(line, at, "error", "-", label="" if k else "goal", look=marked))
     return draw(
         chart,
         *layers,
