@@ -8,6 +8,7 @@ flexible model puts its pins at the same points. The tips differ from the code's
 (0.2 mm for jib strokes up to 0.58 m).
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -48,19 +49,10 @@ def pose(geometry: CraneGeometry, strokes: Array) -> CranePose:
     relative_angle, rocker_head = _jib_angle(geometry, strokes[:, 1])
     jib_angle = lift_angle + relative_angle
 
-    n = len(strokes)
-    pivot = np.broadcast_to(np.array(geometry.lift_pivot), (n, 2))
-
-    def from_lift(point: Vector | Array) -> Array:
-        return pivot + rotate(lift_angle, np.broadcast_to(np.asarray(point, dtype=float), (n, 2)))
-
+    pivot = np.broadcast_to(np.array(geometry.lift_pivot), (len(strokes), 2))
+    from_lift = partial(placed, pivot, lift_angle)
     jib_pivot = from_lift(geometry.jib_pivot)
-
-    def from_jib(point: Vector | Array) -> Array:
-        return jib_pivot + rotate(
-            jib_angle, np.broadcast_to(np.asarray(point, dtype=float), (n, 2))
-        )
-
+    from_jib = partial(placed, jib_pivot, jib_angle)
     return CranePose(
         lift_cylinder_base=pivot + np.array(geometry.lift_cylinder_base),
         lift_pivot=pivot,
@@ -145,8 +137,13 @@ def inverse_with_smallest_extension(
     return inverse(geometry, targets, np.where(np.isnan(extension), at_least, extension))
 
 
+def placed(origin: Array, angle: Array, point: Vector | Array) -> Array:
+    """`point` (n, 2) or (2,) of a body whose frame lies at `origin` (n, 2) and `angle` (n,)."""
+    return origin + rotate(angle, np.asarray(point, dtype=float))
+
+
 def rotate(angle: Array, vectors: Array) -> Array:
-    """Rotate `vectors` (n, 2) by `angle` (n,) in rad, counter-clockwise."""
+    """Rotate `vectors` (n, 2) or (2,) by `angle` (n,) in rad, counter-clockwise."""
     c, s = np.cos(angle), np.sin(angle)
     x, y = vectors[..., 0], vectors[..., 1]
     return np.stack([c * x - s * y, s * x + c * y], axis=-1)
@@ -284,7 +281,7 @@ def _extension_borders(geometry: CraneGeometry, targets: Array) -> list[Array]:
     borders = [extension_of_radius(reach - arm)]
     for limit in (0.0, geometry.stroke_maximum[0]):
         angle = _lift_angle(geometry, np.full(len(targets), limit))
-        to_tip = from_pivot - rotate(angle, np.broadcast_to(geometry.jib_pivot, targets.shape))
+        to_tip = from_pivot - rotate(angle, np.array(geometry.jib_pivot))
         borders.append(extension_of_radius(np.hypot(to_tip[:, 0], to_tip[:, 1])))
     for limit in (0.0, geometry.stroke_maximum[1]):
         angle = _jib_angle(geometry, np.array([limit]))[0]

@@ -16,6 +16,7 @@ from flexik.kinematics.crane import (
     CranePose,
     extension_start_in_jib,
     jib_cylinder_base_in_lift,
+    placed,
     pose,
     rocker_pivot_in_lift,
 )
@@ -251,14 +252,14 @@ class CraneModel:
     def _frames(self, rigid: CranePose) -> dict[str, tuple[Array, float]]:
         """Where abscissa zero of each beam lies and how its axis points."""
         structure = self.crane.structure
-        lift, jib = float(rigid.lift_angle[0]), float(rigid.jib_angle[0])
         overlap = structure.extension_length - self.extension
-        return {
-            "pillar": (np.zeros(2), np.pi / 2),
-            "lift": (_shift(rigid.lift_pivot[0], lift, 0.0, structure.lift_axis_height), lift),
-            "jib": (_shift(rigid.jib_pivot[0], jib, 0.0, structure.jib_axis_height), jib),
-            "extension": (_shift(rigid.extension_start[0], jib, -overlap, 0.0), jib),
+        frames = {
+            "lift": (rigid.lift_pivot, rigid.lift_angle, (0.0, structure.lift_axis_height)),
+            "jib": (rigid.jib_pivot, rigid.jib_angle, (0.0, structure.jib_axis_height)),
+            "extension": (rigid.extension_start, rigid.jib_angle, (-overlap, 0.0)),
         }
+        found = {name: (placed(*given)[0], float(given[1][0])) for name, given in frames.items()}
+        return {"pillar": (np.zeros(2), np.pi / 2), **found}
 
     def _weigh(self, name: str, mesh: Elements) -> list[int]:
         """Hang the mass of a beam on its nodes; returns the loads."""
@@ -365,11 +366,6 @@ def _settings() -> exu.SimulationSettings:
     # the Jacobian of the crane hardly changes
     settings.staticSolver.newton.useModifiedNewton = True
     return settings
-
-
-def _shift(point: Array, angle: float, along: float, left: float) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    return point + np.array([c * along - s * left, s * along + c * left])
 
 
 def listed(values: Array) -> str:

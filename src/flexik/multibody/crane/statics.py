@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexik.kinematics.crane import CranePose, pose, rotate
+from flexik.kinematics.crane import CranePose, placed, pose
 from flexik.multibody.beams import Array
 from flexik.multibody.crane.structure import FlexibleCrane
 
@@ -113,25 +113,14 @@ def _loads(
     def weight(mass: float) -> Array:
         return np.tile([0.0, -gravity * mass], (n, 1))
 
-    def placed(origin: Array, angle: Array, along: float, left: float) -> Array:
-        return origin + rotate(angle, np.tile([along, left], (n, 1)))
-
     at_rocker = parts.rocker.centre_of_mass / geometry.rocker_length
     at_coupler = parts.coupler.centre_of_mass / geometry.coupler_length
     along = parts.extension.centre_of_mass - parts.extension.span[1]
-    centre = placed(p.tip, p.jib_angle, along, parts.extension.mass_offset)
-    jib_centre = placed(
-        p.jib_pivot,
-        p.jib_angle,
-        parts.jib.centre_of_mass,
-        parts.jib_axis_height + parts.jib.mass_offset,
-    )
-    lift_centre = placed(
-        p.lift_pivot,
-        p.lift_angle,
-        parts.lift.centre_of_mass,
-        parts.lift_axis_height + parts.lift.mass_offset,
-    )
+    centre = placed(p.tip, p.jib_angle, (along, parts.extension.mass_offset))
+    in_jib = parts.jib.centre_of_mass, parts.jib_axis_height + parts.jib.mass_offset
+    jib_centre = placed(p.jib_pivot, p.jib_angle, in_jib)
+    in_lift = parts.lift.centre_of_mass, parts.lift_axis_height + parts.lift.mass_offset
+    lift_centre = placed(p.lift_pivot, p.lift_angle, in_lift)
     pillar_centre = np.tile([-parts.pillar.mass_offset, parts.pillar.centre_of_mass], (n, 1))
     return (
         [
