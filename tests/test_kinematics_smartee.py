@@ -36,6 +36,10 @@ def random_poses(n, seed=0, scale=1.0):
     return HEIGHT + values[:, :3], rotation_zyz(values[:, 3:])
 
 
+def random_joints(n, scale=1.0):
+    return inverse(GEOMETRY, *random_poses(n, scale=scale)).joints
+
+
 def centre_elbows():
     return inverse(GEOMETRY, HEIGHT[None], np.eye(3)[None]).joints[0, :, 2]
 
@@ -125,8 +129,7 @@ def test_poses_beyond_the_legs_are_flagged_alone():
 
 
 def test_closure_jacobian_against_central_differences():
-    position, rotation = random_poses(20)
-    joints = inverse(GEOMETRY, position, rotation).joints
+    joints = random_joints(20)
     circles = elbow_circles(GEOMETRY, joints[..., :2])
     elbows = joints[..., 2] + np.random.default_rng(2).normal(scale=0.1, size=(20, 3))
     found = closure_jacobian(leg_tips(circles, elbows), leg_tip_velocities(circles, elbows))
@@ -139,8 +142,7 @@ def test_closure_jacobian_against_central_differences():
 
 
 def test_a_newton_step_solves_the_linear_equations():
-    position, rotation = random_poses(50)
-    actuated = inverse(GEOMETRY, position, rotation).joints[..., :2]
+    actuated = random_joints(50)[..., :2]
     circles = elbow_circles(GEOMETRY, actuated)
     elbows = np.tile(centre_elbows(), (50, 1)) + 0.05
     tips = leg_tips(circles, elbows)
@@ -151,8 +153,7 @@ def test_a_newton_step_solves_the_linear_equations():
 
 def test_newton_converges_quadratically():
     """The error of a step is at most a constant times the square of the one before."""
-    position, rotation = random_poses(200)
-    joints = inverse(GEOMETRY, position, rotation).joints
+    joints = random_joints(200)
     start = joints[..., 2] + np.random.default_rng(3).uniform(-0.05, 0.05, (200, 3))
     errors = [
         np.linalg.norm(newton_steps(GEOMETRY, joints[..., :2], start, n) - joints[..., 2], axis=1)
@@ -168,8 +169,7 @@ def test_newton_converges_quadratically():
 
 
 def test_every_row_of_newton_has_its_own_status():
-    position, rotation = random_poses(3)
-    joints = inverse(GEOMETRY, position, rotation).joints
+    joints = random_joints(3)
     actuated, elbows = joints[..., :2].copy(), joints[..., 2].copy()
     # first links up and second links level: every tip moves straight up, none from another
     actuated[1], elbows[1] = 0.0, -np.pi / 2.0
@@ -185,8 +185,7 @@ def test_every_row_of_newton_has_its_own_status():
 
 
 def test_elbows_a_turn_apart_are_the_same():
-    position, rotation = random_poses(20)
-    joints = inverse(GEOMETRY, position, rotation).joints
+    joints = random_joints(20)
     for turns in (1, -2):
         start = centre_elbows() + 2.0 * np.pi * turns
         found = solve_elbows(GEOMETRY, joints[..., :2], start)
@@ -201,8 +200,7 @@ def test_elbows_a_turn_apart_are_the_same():
 
 
 def test_elbows_however_found_have_a_status():
-    position, rotation = random_poses(4)
-    joints = inverse(GEOMETRY, position, rotation).joints
+    joints = random_joints(4)
     actuated, elbows = joints[..., :2].copy(), joints[..., 2].copy()
     elbows[1] += 1e-3
     elbows[2] = np.nan
@@ -226,8 +224,7 @@ def test_legs_that_no_plate_joins_do_not_converge():
 
 
 def test_steps_that_run_out_are_told():
-    position, rotation = random_poses(30, scale=2.0)
-    actuated = inverse(GEOMETRY, position, rotation).joints[..., :2]
+    actuated = random_joints(30, scale=2.0)[..., :2]
     short = solve_elbows(GEOMETRY, actuated, centre_elbows(), n_steps=1)
     assert np.all(short.status == NOT_CONVERGED) and np.all(short.n_steps == 1)
     whole = solve_elbows(GEOMETRY, actuated, centre_elbows())

@@ -1,7 +1,6 @@
 """Direct kinematics of the SmartEE by network and Newton steps, and how its errors are measured."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from smartee_case import small
 from test_smartee_poses import draw, rows
@@ -13,19 +12,16 @@ from flexik.cases.smartee.parts.methods import DirectKinematics, network_file, t
 from flexik.cases.smartee.parts.poses import (
     ACTUATED_FIELDS,
     ELBOW_FIELDS,
-    FIELDS,
     centre_elbows,
     geometry_of,
     inputs_of,
 )
 from flexik.cases.smartee.parts.starts import linear_error
-from flexik.datasets.tables import write_table
 from flexik.errors import ParameterError
 from flexik.evaluation.errors import evaluate
 from flexik.kinematics.smartee import complete_direct, rotation_zyz
 from flexik.kinematics.status import NOT_CONVERGED, REACHED, SINGULAR
 from flexik.learning.perceptron import quantities
-from flexik.learning.storage import network_file as writer
 from flexik.learning.training import Architecture, Lesson, train
 from flexik.parameters.trainers import LevenbergMarquardtAccelerated
 
@@ -167,18 +163,13 @@ def test_the_best_linear_map_leaves_what_no_line_takes():
     assert linear_error(inputs, inputs**2) == pytest.approx(16.0 / 45.0, rel=5e-3)
 
 
-def test_peaks_of_all_restarts_are_those_of_their_networks(records, tmp_path):
-    found = rows(SMARTEE, "validation")
-    file = tmp_path / "validation.parquet"
-    write_table(file, {f.name: found[f.name].to_numpy() for f in FIELDS}, FIELDS)
-    writer(records)(tmp_path / "restarts.json")
-    write = largest(SMARTEE.machine, tmp_path / "restarts.json", {"validation": file})[".parquet"]
-    write(tmp_path / "peaks.parquet")
-    peaks = pd.read_parquet(tmp_path / "peaks.parquet")
+def test_peaks_of_all_restarts_are_those_of_their_networks(records):
+    networks = dict(enumerate(network for network, _ in records))
+    peaks = largest(SMARTEE.machine, networks, ("validation", rows(SMARTEE, "validation")))
     assert peaks["restart"].tolist() == [0, 1]
     conditions, judge, _ = asked("validation")
-    for (trained_network, _), peak in zip(records, peaks["error"], strict=True):
-        error = judge(conditions.query, trained_network.predict(conditions.query))["error"]
+    for network, peak in zip(networks.values(), peaks["error"], strict=True):
+        error = judge(conditions.query, network.predict(conditions.query))["error"]
         assert peak == pytest.approx(error.max(), rel=1e-12)
 
 

@@ -1,9 +1,11 @@
 """Errors of the direct kinematics of the SmartEE, and their spread over restarts of a training."""
 
+import functools
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from flexik.cases.smartee.parts.errors import COLUMNS, conditions_of, judge_of
@@ -26,9 +28,10 @@ from flexik.cases.smartee.section import (
     Method,
     Section,
 )
-from flexik.datasets.parts import Part, Work, Writer, stacked, table, whole
+from flexik.datasets.parts import Part, Work, Writer, rows, stacked, table, whole
 from flexik.datasets.tables import Field, read_table
 from flexik.evaluation.errors import evaluate, fields_of
+from flexik.learning.perceptron import Network
 from flexik.learning.storage import load_network, load_restarts
 
 N_STEPS = Field("n_steps", "1", "Newton steps at most", "int64")
@@ -52,9 +55,9 @@ def parts(section: Section) -> list[Part]:
             inputs = {"rows": data / f"samples/{conditions}.parquet", **network}
             given = {**shared, "settings": settings}
             found.append(Part(f"{conditions}/{name}", prepare_errors, given, inputs))
-    rows = {name: data / f"samples/{name}.parquet" for name in (VALIDATION, RANDOM, CORNERS)}
+    poses = {name: data / f"samples/{name}.parquet" for name in (VALIDATION, RANDOM, CORNERS)}
     for name in section.networks:
-        files = {"restarts": data / f"networks/{name}.restarts.json", "rows": rows}
+        files = {"restarts": data / f"networks/{name}.restarts.json", "poses": poses}
         found.append(
             Part(f"{RESTARTS}/{name}", prepare_restarts, {"machine": section.machine}, files)
         )
@@ -86,19 +89,22 @@ def judged(
     return {".parquet": table(stacked(tables, fields), fields)}
 
 
-def prepare_restarts(**settings: Any) -> Work:
+def prepare_restarts(*, machine: Machine, restarts: Path, poses: dict[str, Path]) -> Work:
     """Largest errors of the networks of all restarts, those that were not chosen too."""
-    return whole(largest, **settings)
+    sets = [(name, read_table(file)) for name, file in poses.items()]
+    function = functools.partial(largest, machine, load_restarts(restarts))
+    return Work(function, sets, rows(*RESTART_FIELDS))
 
 
-def largest(machine: Machine, restarts: Path, rows: dict[str, Path]) -> dict[str, Writer]:
-    """Table RESTART_FIELDS."""
-    found: list[tuple[object, ...]] = []
-    for conditions, file in rows.items():
-        poses = read_table(file)
-        query, judge = values(poses, ACTUATED_FIELDS), judge_of(geometry_of(machine), poses)
-        for number, network in load_restarts(restarts).items():
-            by_name = judge(query, network.predict(query))
-            found.append((number, conditions, *(by_name[f.name].max() for f in COLUMNS.errors)))
-    columns = zip(RESTART_FIELDS, zip(*found, strict=True), strict=True)
-    return {".parquet": table({f.name: np.array(v) for f, v in columns}, RESTART_FIELDS)}
+def largest(
+    machine: Machine, networks: dict[int, Network], item: tuple[str, pd.DataFrame]
+) -> dict[str, NDArray]:
+    """Columns RESTART_FIELDS of all `networks` on a named set of poses."""
+    conditions, poses = item
+    query, judge = values(poses, ACTUATED_FIELDS), judge_of(geometry_of(machine), poses)
+    errors = [judge(query, network.predict(query)) for network in networks.values()]
+    return {
+        "restart": np.array(list(networks)),
+        "conditions": np.repeat(conditions, len(networks)),
+        **{f.name: np.array([e[f.name].max() for e in errors]) for f in COLUMNS.errors},
+    }

@@ -1,7 +1,7 @@
 """How the closure of the SmartEE is conditioned with dimensions that were not published."""
 
+import functools
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flexik.cases.smartee.parts.poses import POSE_FIELDS, geometry_of, values
 from flexik.cases.smartee.section import Geometry, Machine
-from flexik.datasets.parts import Work, Writer, table, whole
+from flexik.datasets.parts import Work, rows
 from flexik.datasets.tables import Field, read_table
 from flexik.kinematics.smartee import (
     SmartEEGeometry,
@@ -40,27 +40,26 @@ def prepare_geometries(
     *, machine: Machine, height: float, others: Mapping[str, Geometry], random: Path
 ) -> Work:
     """How the closure is conditioned with other dimensions, at the same poses about the height."""
-    own = machine.model_dump(include={"base_radius", "plate_radius"}) | {"height": height}
-    named = {ASSUMED: own} | {name: other.model_dump() for name, other in others.items()}
-    return whole(compared, machine=machine, lengths=named, random=random)
+    radii = machine.model_dump(include={"base_radius", "plate_radius"})
+    named = {ASSUMED: Geometry(height=height, **radii), **others}
+    poses = values(read_table(random), POSE_FIELDS)
+    function = functools.partial(_conditioned, machine, poses, height)
+    return Work(function, list(named.items()), rows(*GEOMETRY_FIELDS))
 
 
-def compared(
-    machine: Machine, lengths: Mapping[str, Mapping[str, float]], random: Path
-) -> dict[str, Writer]:
-    """A row GEOMETRY_FIELDS for the assumed dimensions, and for each of the others."""
-    poses, found = values(read_table(random), POSE_FIELDS), []
-    for name, given in lengths.items():
-        radii = {key: given[key] for key in ("base_radius", "plate_radius")}
-        geometry = replace(geometry_of(machine), **radii)
-        raised = poses[:, :3] + [0.0, 0.0, given["height"] - lengths[ASSUMED]["height"]]
-        solved = inverse(geometry, raised, rotation_zyz(poses[:, 3:]))
-        reached = solved.status == REACHED
-        numbers = conditions(geometry, solved.joints[reached])
-        spread = (np.median(numbers), numbers.max()) if len(numbers) else (np.nan, np.nan)
-        found.append((name, *radii.values(), given["height"], reached.mean(), *spread))
-    columns = zip(GEOMETRY_FIELDS, zip(*found, strict=True), strict=True)
-    return {".parquet": table({f.name: np.array(v) for f, v in columns}, GEOMETRY_FIELDS)}
+def _conditioned(
+    machine: Machine, poses: Array, height: float, item: tuple[str, Geometry]
+) -> dict[str, NDArray]:
+    name, given = item
+    radii = given.model_dump(exclude={"height"})
+    geometry = geometry_of(machine.model_copy(update=radii))
+    raised = poses[:, :3] + [0.0, 0.0, given.height - height]
+    solved = inverse(geometry, raised, rotation_zyz(poses[:, 3:]))
+    reached = solved.status == REACHED
+    numbers = conditions(geometry, solved.joints[reached])
+    spread = (np.median(numbers), numbers.max()) if len(numbers) else (np.nan, np.nan)
+    row = (name, *radii.values(), given.height, reached.mean(), *spread)
+    return {f.name: np.array([value]) for f, value in zip(GEOMETRY_FIELDS, row, strict=True)}
 
 
 def conditions(geometry: SmartEEGeometry, joints: Array) -> Array:
