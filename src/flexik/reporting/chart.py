@@ -100,7 +100,7 @@ def chart(
     y: Axis | Mapping[Any, Axis],
     panel: str | None = None,
     panels: Sequence[Any] | None = None,
-    titles: Mapping[Any, str] | str = "",
+    titles: Mapping[Any, str] | str | None = None,
     looks: Mapping[Any, Look] | None = None,
     rules: Sequence[Rule] = (),
     columns: int = 3,
@@ -115,7 +115,7 @@ def chart(
 
     x, y : axes, of all panels or by panel.
     panel, panels : column that tells the panel of a row; the panels in order, as they come if None.
-    titles : by panel (default: its name, "" for none), or of the only one.
+    titles : by panel (default: its name), or the same for all, "" for none.
     looks : colour, line and marker by value of a hue, see style.looks.
     columns, width, height, widths : panels in a row; inches; relative widths of the columns.
     share : "x", "y", "xy" or "": axes that all panels have in common; None: those not by panel.
@@ -126,10 +126,7 @@ def chart(
     """
     for layer in layers:
         _check(layer)
-    names: list[Any] = [None]
-    if panel is not None:
-        seen = (v for layer in layers if panel in layer.frame for v in layer.frame[panel])
-        names = list(panels or dict.fromkeys(seen))
+    names = list(panels or _panels(layers, panel))
     columns = min(columns, len(names))
     rows = -(-len(names) // columns)
     height = height or 1.1 + (4.0 if len(names) == 1 else 2.5) * rows
@@ -149,8 +146,8 @@ def chart(
             if rule.panel in (None, name):
                 line = axes.axvline if rule.axis == "x" else axes.axhline
                 line(rule.value, label=rule.label or None, zorder=1.6, **rule.look)
-        of_name = {None: titles} if isinstance(titles, str) else titles
-        title = of_name.get(name, "" if name is None else str(name))
+        title = titles if isinstance(titles, str) else (titles or {}).get(name, name)
+        title = "" if title is None else str(title)
         lines = (textwrap.fill(line, CHARACTERS // columns) for line in title.splitlines())
         axes.set(title="\n".join(lines), **({"aspect": "equal"} if equal else {}))
     _set_all(figure, grid, names, (x, y), share)
@@ -165,6 +162,12 @@ def _check(layer: Layer) -> None:
     values = layer.frame[[layer.x, layer.y]].to_numpy(dtype=float)
     if np.isinf(values).any() or not np.isfinite(values).all(axis=1).any():
         raise DataError(f"{what}: expected finite numbers")
+
+
+def _panels(layers: Iterable[Layer], panel: str | None) -> Iterable[Any]:
+    if panel is None:
+        return [None]
+    return dict.fromkeys(v for layer in layers if panel in layer.frame for v in layer.frame[panel])
 
 
 def _inside(layer: Layer, panel: str | None, name: Any) -> pd.DataFrame:

@@ -188,7 +188,7 @@ def _comparison(results: Results) -> Drawing:
         kinds.beside,
         *(pd.concat(rows, ignore_index=True), "method", "ours", "published", axes),
         panel="what",
-        titles=dict.fromkeys(axes, ""),
+        titles="",
         columns=2,
     )
 
@@ -214,7 +214,7 @@ def _positioning_errors(none: pd.DataFrame, frame: pd.DataFrame, label: str) -> 
         y={row: Axis(text, MM, linear_below=1.0) for row, text in ERROR_ROWS.items()},
         x_label="test point, x and y in m (errors: linear scale below 1 mm, logarithmic above)",
         panel="row",
-        titles=dict.fromkeys(ERROR_ROWS, ""),
+        titles="",
         columns=1,
         height=8.2,
         looks=style.shades(frame["payload"]),
