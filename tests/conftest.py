@@ -16,27 +16,12 @@ os.environ["PYTHONPATH"] = str(Path(__file__).parents[1] / "src")
 
 import numpy as np  # noqa: E402
 from smoke_pipeline import ROOT, environment  # noqa: E402
-
-from flexik.machines.crane import CraneGeometry  # noqa: E402
+from virtual_work import GEOMETRY  # noqa: E402
 
 
 @pytest.fixture(scope="session")
 def geometry():
-    return CraneGeometry(
-        lift_pivot=(-0.09, 1.115),
-        lift_cylinder_base=(0.26, -1.04),
-        lift_cylinder_head=(0.3025, -0.105),
-        jib_pivot=(2.88, -0.024),
-        rocker_pivot=(-0.19, -0.015),
-        jib_cylinder_base=(-1.4165, 0.203),
-        coupler_pin=(-0.095, 0.24),
-        extension_start=(2.141, 0.008),
-        lift_cylinder_length=0.8,
-        jib_cylinder_length=1.037,
-        rocker_length=0.45,
-        coupler_length=0.48,
-        stroke_maximum=(0.535, 0.78, 1.6),
-    )
+    return GEOMETRY
 
 
 @pytest.fixture(scope="session")

@@ -27,6 +27,22 @@ JOINTS = ("ground", "B", "G", "rear")  # of each beam with the one before
 GROUND_MOMENT, LINKS, FRONT, N_UNKNOWNS = 8, 9, 13, 14
 LINK_NAMES = ("lift_cylinder", "jib_cylinder", "rocker", "coupler")
 H_ROWS = slice(12, 14)
+# Of the source, not of the machine file
+GEOMETRY = CraneGeometry(
+    lift_pivot=(-0.09, 1.115),
+    lift_cylinder_base=(0.26, -1.04),
+    lift_cylinder_head=(0.3025, -0.105),
+    jib_pivot=(2.88, -0.024),
+    rocker_pivot=(-0.19, -0.015),
+    jib_cylinder_base=(-1.4165, 0.203),
+    coupler_pin=(-0.095, 0.24),
+    extension_start=(2.141, 0.008),
+    lift_cylinder_length=0.8,
+    jib_cylinder_length=1.037,
+    rocker_length=0.45,
+    coupler_length=0.48,
+    stroke_maximum=(0.535, 0.78, 1.6),
+)
 
 
 @dataclass(frozen=True)
@@ -124,11 +140,6 @@ class Posed(NamedTuple):
 
 def nominal_structure(spring_stiffness: float) -> Structure:
     """Return the crane of the reference data on a ground spring of N m/rad."""
-    lift_points = ((-0.09, 1.115), (0.26, -1.04), (0.3025, -0.105), (2.88, -0.024))
-    jib_points = ((-0.19, -0.015), (-1.4165, 0.203), (-0.095, 0.24), (2.141, 0.008))
-    lengths = (0.8, 1.037, 0.45, 0.48)
-    values = *lift_points, *jib_points, *lengths, (0.535, 0.78, 1.6)
-    geometry = CraneGeometry(**dict(zip(CraneGeometry.model_fields, values, strict=True)))
     # the pillar's body frame is the ground frame turned a quarter: abscissa y, lateral -x
     pillar_pins = {"ground": (-0.311, 0.0), "C": (0.075, -0.17), "B": (1.115, 0.09)}
     lift_pins = {"B": (0.0, 0.0), "D": (0.3025, -0.105), "E": (1.2735, 0.164)}
@@ -146,7 +157,7 @@ def nominal_structure(spring_stiffness: float) -> Structure:
     rocker_at_h, coupler_at_i = 11.52 * 0.257 / 0.45, 7.9 * 0.267 / 0.48
     pin_masses = (11.52 - rocker_at_h, rocker_at_h + 7.9 - coupler_at_i, coupler_at_i)
     named = dict(zip(BEAMS, beams, strict=True))
-    return Structure(geometry, named, pin_masses, (-0.404, 0.248), spring_stiffness)
+    return Structure(GEOMETRY, named, pin_masses, (-0.404, 0.248), spring_stiffness)
 
 
 def solve(

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from flexik.cases.fanuc.parts.samples import SHORTER
-from flexik.cases.fanuc.report_figures import FLOOR, figures, trainer_kinds
+from flexik.cases.fanuc.report_figures import FLOOR, figures
 from flexik.cases.fanuc.report_results import PUBLISHED, Results, having, label, read
 from flexik.cases.fanuc.report_tables import (
     JOINTS,
@@ -50,12 +50,11 @@ def metrics(results: Results) -> dict[str, float | None]:
     for name in results.networks:
         for joint, value in zip(JOINTS, results.error_percents[name], strict=True):
             found[f"{name}.joint{joint}_error_percent"] = value
-        means = results.start_means[name].dropna()
-        found[f"{name}.least_mean_error_percent"] = means.min()
-        found[f"{name}.largest_mean_error_percent"] = means.max()
         shifts = MM * results.start_shifts[name]
-        found[f"{name}.least_mean_position_error_mm"] = shifts.min()
-        found[f"{name}.largest_mean_position_error_mm"] = shifts.max()
+        of_starts = {"error_percent": results.start_means[name], "position_error_mm": shifts}
+        for key, starts in of_starts.items():
+            found[f"{name}.least_mean_{key}"] = starts.min()
+            found[f"{name}.largest_mean_{key}"] = starts.max()
     for where in ("path", "random_poses"):
         for label_, row in results.statistics[where].iterrows():
             name = str(label_)
@@ -81,19 +80,15 @@ def values(results: Results) -> dict[str, Any]:
     trainers = {n: section.trainers[e.trainer] for n, e in section.path_networks.items()}
     shapes = {n: (e.learns, e.sizes, e.activation) for n, e in section.path_networks.items()}
     on_path = results.statistics["path"].to_dict("index")
-    twins = {}
-    for name, shape in shapes.items():
-        first = next(other for other in shapes if shapes[other] == shape)
-        if first != name:
-            twins[name] = first
+    firsts = {n: next(o for o in shapes if shapes[o] == shape) for n, shape in shapes.items()}
     return {
         "section": section,
         "networks": section.path_networks,
         "trainers": trainers,
-        "kinds": trainer_kinds(results),
-        "means": {name: spread(results.start_means[name].dropna()) for name in results.networks},
+        "kinds": list(results.by_trainer),
+        "means": {name: spread(means) for name, means in results.start_means.items()},
         "verdict": verdict(results),
-        "twins": twins,
+        "twins": {name: first for name, first in firsts.items() if first != name},
         "kept": kept(results),
         "on_path": on_path,
         "looked_up": LOOKED_UP,
@@ -122,18 +117,17 @@ def verdict(results: Results) -> dict[str, Any] | None:
         clearly_less(by_joint.get_group((one, joint)), by_joint.get_group((other, joint)))
         for joint in JOINTS
     ]
-    counts = []
+    won = {}
     for error in PASS_ERRORS:
         medians = results.passes_needed(error).groupby(["network", "joint"])["passes"].median()
         first, second = medians[one], medians[other]
-        won = int((first < second).sum()), int((first > second).sum())
-        counts.append({"error": error, "won": won})
-    clear = clearly_less(means[one].dropna(), means[other].dropna())
+        won[error] = int((first < second).sum()), int((first > second).sum())
+    clear = clearly_less(means[one], means[other])
     return {
         "names": PUBLISHED_NETWORKS,
         "winner": PUBLISHED_NETWORKS[clear - 1] if clear else None,
         "decided": (decided.count(1), decided.count(2)),
-        "passes": counts,
+        "passes": won,
     }
 
 
@@ -148,16 +142,9 @@ def kept(results: Results) -> dict[str, dict[str, float]]:
     curves = results.curves.merge(results.starts[[*keys, "kept"]], on=keys)
     curves = curves[curves["iteration"] == curves["kept"]]
     ratio = curves["test_error"] / curves["training_error"]
-    found = (
-        curves.assign(ratio=ratio)
-        .groupby("network")
-        .agg(
-            first=("kept", "min"),
-            last=("kept", "max"),
-            least=("ratio", "min"),
-            largest=("ratio", "max"),
-        )
-    )
+    groups = curves.assign(ratio=ratio).groupby("network")
+    found = groups[["kept", "ratio"]].agg(["min", "max"])
+    found.columns = ["first", "last", "least", "largest"]
     return found.loc[results.networks].to_dict("index")  # type: ignore[return-value]
 
 

@@ -1,7 +1,6 @@
 """Figures of the six-joint arm; mm and degrees."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -45,23 +44,9 @@ def looks(results: Results) -> dict[Any, dict[str, Any]]:
     return fixed
 
 
-def trainer_kinds(results: Results) -> list[str]:
-    """Kinds of the trainers of the path's networks, each once."""
-    return list(dict.fromkeys(_kind(results, name) for name in results.networks))
-
-
-def _kind(results: Results, name: str) -> str:
-    section = results.section
-    return section.trainers[section.networks[name].trainer].kind
-
-
 def figures(results: Results) -> dict[str, Drawing]:
     """All figures."""
-    by_kind = {
-        kind: [name for name in results.networks if _kind(results, name) == kind]
-        for kind in trainer_kinds(results)
-    }
-    shown = by_kind.get("back_propagation", results.networks)
+    shown = results.by_trainer.get("back_propagation", results.networks)
     look = looks(results)
     by_joint = {"panel": "joint", "columns": 2, "height": 8.0, "share": "x", "looks": look}
     rows = results.of("path")
@@ -81,7 +66,7 @@ def figures(results: Results) -> dict[str, Drawing]:
                 y=Axis("rms error (% of range)", 100.0, log=True),
                 **by_joint,
             )
-            for kind, names in by_kind.items()
+            for kind, names in results.by_trainer.items()
         },
         "path_tracking": draw(
             chart,
@@ -179,12 +164,12 @@ def _training(results: Results, names: list[str]) -> list[Layer]:
 def _study(results: Results, varied: str) -> Drawing:
     errors = results.study_statistics(varied)
     blue, orange = {"color": style.BLUE, "marker": "o"}, {"color": style.ORANGE, "marker": "s"}
-    band = Layer(errors, "value", "least", "band", to="largest", look={"color": style.SKY})
+    sky, label_of_all = {"color": style.SKY}, "total error, all starts"
     what = "hidden neurons" if varied == "n_hidden" else "learning factor"
     labels = ("total error on the test samples, median", "the same on the training samples, median")
     return draw(
         chart,
-        replace(band, label="total error, all starts"),
+        Layer(errors, "value", "least", "band", to="largest", look=sky, label=label_of_all),
         Layer(errors, "value", "median", "o-", look=blue, label=labels[0]),
         Layer(errors, "value", "training", "s--", look=orange, label=labels[1]),
         x=Axis(f"{what} (1)", log=True, ticks=list(errors["value"])),

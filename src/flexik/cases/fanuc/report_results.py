@@ -1,7 +1,8 @@
 """What the stages of the six-joint arm found, as its report needs it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -75,12 +76,19 @@ class Results:
         """Newton steps, at most."""
         return self.section.conditions.refinement.n_steps
 
+    @property
+    def by_trainer(self) -> dict[str, list[str]]:
+        """Names of the networks of the path by the kind of their trainer."""
+        found: dict[str, list[str]] = {}
+        for name, network in self.section.path_networks.items():
+            found.setdefault(self.section.trainers[network.trainer].kind, []).append(name)
+        return found
+
     @cached_property
-    def start_means(self) -> pd.DataFrame:
-        """Total error, mean over the joints, percent: a row a start, a column a network."""
-        return self.starts.pivot_table(
-            index="restart", columns="network", values="error_percent", aggfunc="mean"
-        )[self.networks]
+    def start_means(self) -> dict[str, pd.Series]:
+        """By network the total error of each start, mean over the joints, percent."""
+        groups = self.starts.groupby(["network", "restart"])["error_percent"].mean()
+        return {name: groups[name] for name in self.networks}
 
     @cached_property
     def error_percents(self) -> dict[str, Array]:
@@ -161,18 +169,13 @@ def _stays_below(errors: Array, limit: float) -> float:
 
 def read(section: Section) -> Results:
     """All of it; raises DataError if something is missing, damaged or impossible."""
-    tables = {
-        kind: pd.concat(
-            read_table(section.data / f"networks/{name}.{kind}.parquet").assign(network=name)
-            for name in section.path_networks
-        )
-        for kind in ("starts", "curves")
-    }
-    start_errors = [
-        _errors(section, f"{where}/{name}", ".starts")
-        for where in ("path", "off_path")
-        for name in section.path_networks
-    ]
+
+    def of_networks(kind: str) -> pd.DataFrame:
+        files = {n: section.data / f"networks/{n}.{kind}.parquet" for n in section.path_networks}
+        return pd.concat(read_table(file).assign(network=name) for name, file in files.items())
+
+    parts = [part.name for part in evaluate.parts(section)]
+    with_starts = [f"{where}/{n}" for where in ("path", "off_path") for n in section.path_networks]
     studies = {
         name: read_table(section.data / f"studies/{name}.parquet")
         for name in type(section.studies).model_fields
@@ -182,30 +185,29 @@ def read(section: Section) -> Results:
     return Results(
         section=section,
         path=read_table(section.data / "samples/path.parquet", PATH_FIELDS),
-        **tables,
-        start_errors=pd.concat(start_errors, ignore_index=True),
+        starts=of_networks("starts"),
+        curves=of_networks("curves"),
+        start_errors=_errors(section, with_starts, ".starts"),
         studies=studies,
-        errors=pd.concat(
-            [_errors(section, part.name) for part in evaluate.parts(section)], ignore_index=True
-        ),
+        errors=_errors(section, parts),
         published=published(PUBLISHED),
         times=times[times["settings"] == query_settings(section)],
         growth=growth[growth["settings"] == growth_settings(section)],
     )
 
 
-def _errors(section: Section, part: str, kind: str = "") -> pd.DataFrame:
-    """Rows of Results.errors of the part "CONDITIONS/METHOD"; of all starts: `kind` ".starts"."""
-    conditions, method = part.split("/")
-    queries = [field.name for field in QUERY_FIELDS]
-    asked = read_table(section.data / f"samples/conditions/{conditions}.parquet")
-    found = read_table(section.data / f"errors/{part}{kind}.parquet")
-    found = found.drop(columns=queries, errors="ignore").join(
-        asked.drop(columns=queries), on="point"
-    )
-    labels = found["n_steps"].map(lambda n_steps: label(method, n_steps))
-    named = found.assign(conditions=conditions, method=method, label=labels)
-    return judged(named, section.success)
+def _errors(section: Section, parts: Sequence[str], kind: str = "") -> pd.DataFrame:
+    """Results.errors of parts "CONDITIONS/METHOD"; those of all starts: `kind` ".starts"."""
+    queries, tables = [field.name for field in QUERY_FIELDS], []
+    for part in parts:
+        conditions, method = part.split("/")
+        asked = read_table(section.data / f"samples/conditions/{conditions}.parquet")
+        found = read_table(section.data / f"errors/{part}{kind}.parquet")
+        found = found.drop(columns=queries, errors="ignore")
+        found = found.join(asked.drop(columns=queries), on="point")
+        labels = found["n_steps"].map(partial(label, method))
+        tables.append(found.assign(conditions=conditions, method=method, label=labels))
+    return judged(pd.concat(tables, ignore_index=True), section.success)
 
 
 def judged(errors: pd.DataFrame, success: Success) -> pd.DataFrame:

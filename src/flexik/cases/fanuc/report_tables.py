@@ -86,7 +86,7 @@ def total_errors(results: Results) -> Table:
     for name in results.networks:
         of_network = having(results.starts, network=name)
         groups = [having(of_network, joint=joint)["error_percent"] for joint in JOINTS]
-        spreads = [spread(values) for values in [*groups, results.start_means[name].dropna()]]
+        spreads = [spread(values) for values in [*groups, results.start_means[name]]]
         columns[f"{name} (%)"] = [
             f"{s['median']:.3g}" + (f" ({s['least']:.3g} to {s['largest']:.3g})" * (s["n"] > 1))
             for s in spreads
