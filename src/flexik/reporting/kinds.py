@@ -66,13 +66,11 @@ def beside(
     *,
     hue: str | None = None,
     panel: str | None = None,
-    names: Mapping[Any, str] | None = None,
     numbers: str = ".2f",
     **options: Any,
 ) -> Figure:
     """Our values filled, published ones (NaN: none) open, a line a category, the first on top.
 
-    names : what to write for a category.
     numbers : format of the numbers beside the dots; "" for none.
     """
     categories = {value: k for k, value in enumerate(dict.fromkeys(frame[category]))}
@@ -98,7 +96,7 @@ def beside(
         given = {None: x} if isinstance(x, Axis) else x
         wide = {name: replace(axis, margin=0.12) for name, axis in given.items()}
         x = wide.get(None, wide)
-    ticks = {k: (names or {}).get(c, str(c)) for c, k in categories.items()}
+    ticks = {k: str(name) for name, k in categories.items()}
     y = Axis(ticks=ticks, limits=(len(ticks) - 0.45, -0.55))
     defaults: dict[str, Any] = {"share": "y"}
     defaults["height"] = 1.3 + (0.6 if numbers else 0.42) * len(ticks)
@@ -160,7 +158,6 @@ def sizes(
     published: Mapping[Any, int | None] | int | None = None,
     band: bool = True,
     x_label: str = "hidden neurons (1)",
-    y: Axis | None = None,
     **options: Any,
 ) -> Figure:
     """Training and selection error (learning.size_selection.by_size) against the network's size.
@@ -187,7 +184,7 @@ def sizes(
             if size is not None:
                 text = f"{label} size" if panel else f"{label}: {size}"
                 rules.append(Rule("x", size, text, look, panel=name))
-    y = y or Axis("root mean square error, normalised (1)", log=True)
+    y = Axis("root mean square error, normalised (1)", log=True)
     few = sorted(set(frame["n_hidden"]))
     x = Axis(x_label, integer=True, ticks=few if len(few) <= 15 and panel is None else None)
     return chart(*layers, x=x, y=y, panel=panel, rules=rules, **options)

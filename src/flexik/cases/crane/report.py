@@ -11,7 +11,7 @@ from flexik.cases.crane.parts.fields import STROKES
 from flexik.cases.crane.parts.samples import counts
 from flexik.cases.crane.report_figures import figures
 from flexik.cases.crane.report_results import REFERENCE, Results, read
-from flexik.cases.crane.report_tables import tables
+from flexik.cases.crane.report_tables import calibration, tables
 from flexik.cases.crane.section import Section
 from flexik.evaluation.errors import STATISTICS
 from flexik.kinematics.status import REACHED, STATUS_MEANING
@@ -88,6 +88,6 @@ def values(results: Results) -> dict[str, Any]:
         "descends": all(m.inversion.kind == "gradient_descent" for m in inverted),  # type: ignore[attr-defined]
         "has_cost": results.query_cost().drop(columns="published").dropna().size > 0,
         "grid": counts(results.grid),
-        "calibration": tables(results)["calibration"].frame.to_dict("records"),
+        "calibration": calibration(results).frame.to_dict("records"),
         "least_selection_error": results.training.groupby("network")["selection_error"].min(),
     }

@@ -97,7 +97,7 @@ def tables(results: Results) -> dict[str, Table]:
         "tolerance_study": _tolerances(results),
         "query_cost": Table(cost, COST),
         "workspace": table(workspace, WORKSPACE),
-        "calibration": _calibration(results),
+        "calibration": calibration(results),
         "mesh_study": table(results.mesh, MESH),
         "training": Table(training, {"training error": 4, "selection error": 4}),
         "training_race": _race(results.training_curves),
@@ -117,7 +117,7 @@ def _errors(results: Results, labels: list[str]) -> Table:
     return Table(errors)
 
 
-def _calibration(results: Results) -> Table:
+def calibration(results: Results) -> Table:
     """Our six statistics without compensation beside the published ones."""
     errors = results.compared(["none"]).set_axis(["ours", "published"], axis=1)
     errors["difference (%)"] = 100 * (errors["ours"] / errors["published"] - 1)
