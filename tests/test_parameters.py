@@ -225,7 +225,6 @@ WRONG = [
 # Mistakes told by a neighbour that the value has to fit
 TOLD_BY = {
     "crane.conditions.published.payloads": "crane.conditions.published.points",
-    "smartee.studies.starts.trainers": "smartee.studies.starts.tuned",
 }
 
 

@@ -61,7 +61,7 @@ def metrics(results: Results) -> dict[str, float | None]:
     shown = {f"{title}_mm": (column, MM, 4) for title, column in errors.items()}
     found = _rounded(results.fits, r_columns | held_out)
     found |= _rounded(results.positioning, shown | {"n_failed": ("n_failed", 1, None)})
-    for changed, error in sensitivity(results, results.main).drop(NOTHING).items():
+    for changed, error in sensitivity(results)[results.main].drop(NOTHING).items():
         found[f"{results.main}.{changed}_off_mean_error_mm"] = round(MM * error, 4)
     for k, r in enumerate(R, start=1):
         found[f"splits.median_r_theta{k}"] = round(results.splits[r].median(), 6)
@@ -137,18 +137,18 @@ def splits_table(results: Results) -> Table:
     return table(rows.fillna({"seed": ""}), {"division": "division", "seed": "seed", **titles})
 
 
-def sensitivity(results: Results, name: str) -> pd.Series:
-    """Mean tip error in m of a network by the input that is off."""
+def sensitivity(results: Results) -> pd.DataFrame:
+    """Mean tip errors in m by the input that is off, a column a network."""
     rows = chosen(results.of("studies/sensitivity"))
-    return rows[rows["network"] == name].set_index("input")["mean_error"]
+    frame = rows.pivot_table(index="input", columns="network", values="mean_error")
+    return frame.loc[rows["input"].unique(), rows["network"].unique()]
 
 
 def sensitivity_table(results: Results) -> Table:
-    """Mean tip errors in mm by input and network, and by how much the input is off."""
-    rows = chosen(results.of("studies/sensitivity"))
-    off = rows.groupby("input", sort=False)["change"].first()
-    by_network = {name: MM * sensitivity(results, name) for name in dict.fromkeys(rows["network"])}
-    frame = pd.DataFrame({"off by (um, urad)": MICRO * off, **by_network}).loc[off.index]
+    """The same in mm, and by how much the input is off."""
+    frame = MM * sensitivity(results)
+    off = results.of("studies/sensitivity").groupby("input")["change"].first()
+    frame.insert(0, "off by (um, urad)", MICRO * off)
     return Table(frame.rename_axis("input that is off").reset_index(), 3)
 
 
@@ -230,7 +230,7 @@ def alike(results: Results, *keys: str) -> list[str]:
 
 def sensitivity_values(results: Results) -> dict[str, Any]:
     """The input that the published network depends on most, and which noise costs it more."""
-    off, rows = sensitivity(results, results.main), results.of("studies/sensitivity")
+    off, rows = sensitivity(results)[results.main], results.of("studies/sensitivity")
     worst = str(off.drop(NOTHING).idxmax())
     rows = rows[(rows["network"] == results.main) & (rows["input"] == worst)]
     same = alike(results, "trainer", "n_hidden", "learns")
