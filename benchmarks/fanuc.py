@@ -151,7 +151,7 @@ def grow(section: Section, arm: SerialArm) -> pd.DataFrame:
         seconds = time.process_time() - started
         plain = ArmConfigurations(arm, {0: found})
         steps = section.conditions.refinement.model_copy(update={"n_steps": 3})
-        errors = pd.DataFrame(evaluate.errors_of(evaluate.Item(arm, plain, query, steps)))
+        errors = pd.DataFrame(evaluate.errors_of(arm, query, steps, plain))
         before, after = (errors[errors["n_steps"] == n_steps] for n_steps in (0, 3))
         reached = judged(after, section.success)["reached"]
         rows.append(

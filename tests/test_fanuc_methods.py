@@ -131,13 +131,13 @@ def test_errors_are_distances_angles_and_configurations(joints):
 
 
 def test_a_method_has_a_row_for_every_query_and_step(joints):
-    item = evaluate.Item(ARM, rough(joints, 0.01), query_of(joints), STEPS)
-    found = evaluate.errors_of(item)
+    query, method = query_of(joints), rough(joints, 0.01)
+    found = evaluate.errors_of(ARM, query, STEPS, method)
     assert np.array_equal(found["n_steps"], np.repeat([0, 1, 2], 40))
     assert np.array_equal(found["point"], np.tile(np.arange(40), 3))
     medians = [np.median(found["error"][found["n_steps"] == n]) for n in range(3)]
     assert medians[1] < 0.05 * medians[0] and medians[2] < 0.05 * medians[1]
-    alone = evaluate.errors_of(dataclasses.replace(item, refinement=None))
+    alone = evaluate.errors_of(ARM, query, None, method)
     commanded = np.column_stack([alone[field.name] for field in COMMANDED_FIELDS])
     assert np.array_equal(commanded, joints + 0.01)
 
@@ -229,8 +229,7 @@ def test_starts_that_learn_together_become_what_they_are_alone(path):
     rule = BackPropagation(mode="pattern", n_iterations=3)
     work = train.prepare_path(**settings, trainer=rule, n_restarts=2, path=path)
     (item,) = work.items
-    together = train.train_starts(item)
-    alone = train.train_starts(dataclasses.replace(item, attempts=item.attempts[1:]))
+    together, alone = work.function(item), work.function(item[1:])
     for name, values in alone.items():
         assert np.array_equal(together[name], values), name
 
@@ -242,8 +241,8 @@ def test_a_study_tells_errors_of_every_value_and_start(samples, path):
     by_size = study.prepare(varied="n_hidden", values=[2, 4], **settings)
     by_factor = study.prepare(varied="learning_factor", values=[0.03, 0.2], **settings)
     assert (len(by_size.items), len(by_factor.items)) == (2, 1)
-    sizes = stacked([study.errors_of(item) for item in by_size.items], study.STUDY_FIELDS)
-    factors = study.errors_of(by_factor.items[0])
+    sizes = stacked([by_size.function(item) for item in by_size.items], study.STUDY_FIELDS)
+    factors = by_factor.function(by_factor.items[0])
     assert sizes["value"].tolist() == [2.0, 2.0, 4.0, 4.0]
     assert factors["value"].tolist() == [0.03, 0.03, 0.2, 0.2]
     # the size and the factor of the others stand in both

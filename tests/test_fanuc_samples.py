@@ -105,8 +105,8 @@ def test_the_nearest_point_of_a_path_by_hand():
 
 def drawn(arm, n, role=0):
     """Numbers and joints of all arm configurations, `n` each."""
-    items = generate.prepare_poses(arm=arm, n=n, seed=3, role=role, length=None).items
-    frame = pd.concat(pd.DataFrame(generate.random_poses(item)) for item in items)
+    work = generate.prepare_poses(arm=arm, n=n, seed=3, role=role, length=None)
+    frame = pd.concat(pd.DataFrame(work.function(item)) for item in work.items)
     return frame["configuration"].to_numpy(), array(frame, JOINT_FIELDS)
 
 

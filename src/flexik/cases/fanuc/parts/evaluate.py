@@ -1,7 +1,7 @@
 """Command the joints that every method gives, and see where the end effector comes to stand."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -97,16 +97,6 @@ def _methods(
     return [ClosedForm(arm)]
 
 
-@dataclass(frozen=True, eq=False)
-class Item:
-    """A method, the queries (n, 13) it is asked, and Newton steps after it."""
-
-    arm: SerialArm
-    method: Method
-    query: Array
-    refinement: Refinement | None
-
-
 def prepare(
     *,
     arm: SerialArm,
@@ -121,7 +111,6 @@ def prepare(
     query = array(read_table(asked_for), QUERY_FIELDS)
     chosen = _methods(arm, kind, networks, path)
     starts = [] if restarts is None else _methods(arm, kind, restarts)
-    items = [Item(arm, each, query, refinement) for each in (*chosen, *starts)]
 
     def finish(results: list[Table]) -> Mapping[str, Writer]:
         writers = {".parquet": table(results[0], FIELDS)}
@@ -133,20 +122,20 @@ def prepare(
             writers[".starts.parquet"] = table(stacked(each, START_FIELDS), START_FIELDS)
         return writers
 
-    return Work(errors_of, items, finish)
+    return Work(partial(errors_of, arm, query, refinement), [*chosen, *starts], finish)
 
 
-def errors_of(item: Item) -> Table:
-    """Columns FIELDS."""
-    arm, steps, tables = item.arm, item.refinement, []
-    conditions = Conditions(item.query, np.zeros((len(item.query), 6)), np.arange(len(item.query)))
+def errors_of(arm: SerialArm, query: Array, steps: Refinement | None, method: Method) -> Table:
+    """Columns FIELDS of `method` at queries (n, 13), without and with Newton steps after it."""
+    tables, n = [], len(query)
+    conditions = Conditions(query, np.zeros((n, 6)), np.arange(n))
     columns = Columns(QUERY_FIELDS, COMMANDED_FIELDS, ERROR_FIELDS, arm.minimum, arm.maximum)
     for n_steps in range((0 if steps is None else steps.n_steps) + 1):
-        method = item.method
+        asked_for = method
         if n_steps and steps is not None:
-            method = Refined(arm, method, n_steps, steps.damping, steps.orientation_length)
-        found = evaluate(method, conditions, lambda q, v: judge(arm, q, v), columns)
-        tables.append(found | {STEPS.name: np.full(len(item.query), n_steps)})
+            asked_for = Refined(arm, method, n_steps, steps.damping, steps.orientation_length)
+        found = evaluate(asked_for, conditions, partial(judge, arm), columns)
+        tables.append(found | {STEPS.name: np.full(n, n_steps)})
     return stacked(tables, FIELDS)
 
 

@@ -1,6 +1,7 @@
 """Sample the taught path and random poses of every arm configuration, and draw the targets."""
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -72,15 +73,16 @@ def prepare_poses(*, arm: SerialArm, n: int, seed: int, role: int, length: float
 
     `role` tells sets of the same seed apart, `length` is the orientation length of `RANDOM_FIELDS`.
     """
-    items = [(arm, n, seed, role, number, length) for number in range(N_CONFIGURATIONS)]
     fields = POSE_FIELDS if length is None else RANDOM_FIELDS
-    return Work(random_poses, items, rows(*fields))
+    function = partial(random_poses, arm, n, (seed, role), length)
+    return Work(function, range(N_CONFIGURATIONS), rows(*fields))
 
 
-def random_poses(item: tuple[SerialArm, int, int, int, int, float | None]) -> Columns:
-    """Columns of one arm configuration."""
-    arm, n, seed, role, number, length = item
-    joints = random_joints(arm, number, n, np.random.default_rng((seed, role, number)))
+def random_poses(
+    arm: SerialArm, n: int, seed: tuple[int, int], length: float | None, number: int
+) -> Columns:
+    """Columns of arm configuration `number`."""
+    joints = random_joints(arm, number, n, np.random.default_rng((*seed, number)))
     numbers = np.full(n, number)
     found = {CONFIGURATION.name: numbers, **named(JOINT_FIELDS, joints)}
     if length is not None:

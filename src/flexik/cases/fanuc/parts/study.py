@@ -1,6 +1,7 @@
 """The network of one joint in several sizes and with several learning factors."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -34,15 +35,6 @@ def parts(section: Section) -> list[Part]:
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class Item:
-    """Starts of one shape, and the value of each."""
-
-    samples: TaughtSamples
-    values: list[float]
-    attempts: list[Attempt]
-
-
 def prepare(
     *,
     varied: str,
@@ -60,29 +52,28 @@ def prepare(
     The learning factor stays what it is: it is the least the trainer may come down to as well.
     """
     samples = TaughtSamples.of_table(read_table(path, PATH_FIELDS))
-    by_size: dict[tuple[int, ...], Item] = {}
+    by_size: dict[tuple[int, ...], list[tuple[float, Attempt]]] = {}
     for value in values:
         size = (int(value),) if varied == "n_hidden" else n_hidden
         factor = value if varied == "learning_factor" else trainer.learning_rate
         settings = trainer.but(learning_rate=factor, minimum_rate=factor)
-        item = by_size.setdefault(size, Item(samples, [], []))
         for restart in range(n_restarts):
-            item.values.append(float(value))
-            architecture = Architecture(size, activation)
-            attempt = samples.attempt((joint,), architecture, settings, seed, restart)
-            item.attempts.append(attempt)
-    return Work(errors_of, list(by_size.values()), rows(*STUDY_FIELDS))
+            given = Architecture(size, activation), settings, seed, restart
+            attempt = samples.attempt((joint,), *given)
+            by_size.setdefault(size, []).append((float(value), attempt))
+    return Work(partial(errors_of, samples), list(by_size.values()), rows(*STUDY_FIELDS))
 
 
-def errors_of(item: Item) -> Columns:
-    """Columns STUDY_FIELDS."""
-    learnt = learn(item.samples, item.attempts)
-    errors = np.array([item.samples.errors(each.network, percent)[:, 0] for each in learnt])
+def errors_of(samples: TaughtSamples, item: Sequence[tuple[float, Attempt]]) -> Columns:
+    """Columns STUDY_FIELDS of starts of one shape, and the value of each."""
+    values, attempts = zip(*item, strict=True)
+    learnt = learn(samples, attempts)
+    errors = np.array([samples.errors(each.network, percent)[:, 0] for each in learnt])
     columns = (
-        item.values,
-        [attempt.restart for attempt in item.attempts],
+        values,
+        [attempt.restart for attempt in attempts],
         *errors.T,
         [each.record.kept for each in learnt],
         [str(each.record.stop_reason) for each in learnt],
     )
-    return {f.name: np.array(values) for f, values in zip(STUDY_FIELDS, columns, strict=True)}
+    return {f.name: np.array(column) for f, column in zip(STUDY_FIELDS, columns, strict=True)}

@@ -1,7 +1,8 @@
 """Train the networks of the taught path, and those of the whole workspace."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -51,15 +52,6 @@ def parts(section: Section) -> list[Part]:
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class Item:
-    """Networks of some starts; `n_groups` of one start give all joints."""
-
-    samples: TaughtSamples
-    n_groups: int
-    attempts: list[Attempt]
-
-
 def prepare_path(
     *,
     learns: str,
@@ -81,18 +73,20 @@ def prepare_path(
         for number, joints in enumerate(groups * n_restarts)
     ]
     n = len(attempts) if isinstance(trainer, BackPropagation) else len(groups)
-    items = [Item(samples, len(groups), attempts[k : k + n]) for k in range(0, len(attempts), n)]
-    return Work(train_starts, items, lambda results: _files(samples, results))
+    items = [attempts[k : k + n] for k in range(0, len(attempts), n)]
+    function = partial(train_starts, samples, len(groups))
+    return Work(function, items, partial(_files, samples))
 
 
-def train_starts(item: Item) -> Columns:
+def train_starts(samples: TaughtSamples, n: int, attempts: Sequence[Attempt]) -> Columns:
     """Of every start k: network_k, packed; kept_k (6,); curves_k (2, passes + 1, 6).
 
-    Where a network took fewer passes than another of its start, its curve ends with nan.
+    A start is `n` attempts, whose networks give all joints. Where one took fewer passes than
+    another, its curve ends with nan.
     """
-    learnt, n, found = learn(item.samples, item.attempts), item.n_groups, dict[str, np.ndarray]()
+    learnt, found = learn(samples, attempts), dict[str, np.ndarray]()
     for first in range(0, len(learnt), n):
-        start = item.attempts[first].restart // n
+        start = attempts[first].restart // n
         networks, records, curves = zip(*learnt[first : first + n], strict=True)
         joined = side_by_side(networks)
         n_joints = [len(network.outputs) for network in networks]
