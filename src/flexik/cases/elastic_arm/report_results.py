@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from flexik.cases.elastic_arm.parts.readings import ANGLES, HELD_OUT
 from flexik.cases.elastic_arm.section import Section
@@ -128,13 +127,15 @@ class Results:
     @functools.cached_property
     def positioning(self) -> pd.DataFrame:
         """Methods by name: statistics at the random targets, m, and where they come from."""
-        rows: dict[str, dict[str, Any]] = {}
+        methods, rows = self.section.methods, dict[str, dict[str, Any]]()
+        none = next(label for label, method in methods.items() if method.method == "none")
         for label, frame in self.errors.items():
-            method, error = self.section.methods[label], frame["error"]
+            method, error = methods[label], frame["error"]
             row: dict[str, Any] = dict(workspace_statistics(frame))
             row["clipped"] = int((frame["n_clipped"] > 0).sum())
-            row["n_worse"] = int((error > self.errors[self.uncompensated]["error"]).sum())
-            near = self.near_payloads(frame)
+            row["n_worse"] = int((error > self.errors[none]["error"]).sum())
+            apart = np.abs(frame["payload"].to_numpy()[:, None] - self.section.samples.payloads)
+            near = apart.min(axis=1) <= NEAR
             row |= {"n_near": int(near.sum()), "near": error[near].mean()}
             row |= {"far": error[~near].mean(), "knows": "target"}
             if method.network is not None:
@@ -152,11 +153,6 @@ class Results:
         return pd.DataFrame.from_dict(rows, orient="index").assign(told=told)
 
     @property
-    def uncompensated(self) -> str:
-        """Name of the method without compensation."""
-        return next(k for k, method in self.section.methods.items() if method.method == "none")
-
-    @property
     def splits(self) -> pd.DataFrame:
         """R of the published network by every division, the main one first."""
         first = {"seed": self.section.samples.seed, **self.fits.loc[self.main, R]}
@@ -167,8 +163,3 @@ class Results:
         angles = self.readings[list(ANGLES)].to_numpy()
         ends = np.isclose(angles, angles.min(axis=0)) | np.isclose(angles, angles.max(axis=0))
         return int(ends.any(axis=1)[self.readings["part"] == HELD_OUT].sum())
-
-    def near_payloads(self, frame: pd.DataFrame) -> NDArray[np.bool_]:
-        """Rows (n,) of `frame` whose payload is within NEAR of one of the readings'."""
-        apart = np.abs(frame["payload"].to_numpy()[:, None] - self.section.samples.payloads)
-        return np.asarray(apart.min(axis=1) <= NEAR)

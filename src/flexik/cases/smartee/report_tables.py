@@ -154,23 +154,22 @@ def outside(results: Results) -> pd.DataFrame:
     """A row for every stretch of extent: elbow errors of the networks, and what Newton finds."""
     poses = results.section.conditions["outside"]
     assert isinstance(poses, OutsidePoses)  # the section sees to it
-    limits, rows = np.linspace(1.0, poses.extent, N_STRETCHES), []
-    for low, high in zip([0.0, *limits[:-1]], limits, strict=True):
-        parts = {
-            key[:2]: group[(group["extent"] > low) & (group["extent"] <= high)]
-            for key, group in results.groups.items()
-            if key[2] == "outside"
-        }
-        row: dict[str, object] = {"extent": f"{low:g} to {high:g}"}
-        for name in GOALS:
-            errors, after = MM * parts[name, 0]["error"], parts[name, STEPS]["error"]
-            row[f"{name} median (mrad)"] = float(errors.median())
-            row[f"{name} peak (mrad)"] = float(errors.max())
-            row[f"{name} + {STEPS} steps right (%)"] = 100.0 * float((after <= RIGHT).mean())
-        (found,) = (part for key, part in parts.items() if key[0] == "newton")
-        row["Newton from the centre right (%)"] = 100.0 * float(right(found).mean())
-        rows.append(row)
-    return pd.DataFrame(rows)
+    edges = [0.0, *np.linspace(1.0, poses.extent, N_STRETCHES)]
+    labels = [f"{low:g} to {high:g}" for low, high in itertools.pairwise(edges)]
+
+    def by_stretch(rows: pd.DataFrame, values: pd.Series) -> Any:
+        return values.groupby(pd.cut(rows["extent"], edges, labels=labels), observed=False)
+
+    columns = {}
+    for name in GOALS:
+        start, after = (results.groups[name, n_steps, "outside"] for n_steps in (0, STEPS))
+        errors, met = by_stretch(start, MM * start["error"]), after["error"] <= RIGHT
+        columns[f"{name} median (mrad)"] = errors.median()
+        columns[f"{name} peak (mrad)"] = errors.max()
+        columns[f"{name} + {STEPS} steps right (%)"] = 100.0 * by_stretch(after, met).mean()
+    found = newton_groups(results)["outside"]
+    columns["Newton from the centre right (%)"] = 100.0 * by_stretch(found, right(found)).mean()
+    return pd.DataFrame(columns).reset_index()
 
 
 def newton(results: Results) -> pd.DataFrame:
