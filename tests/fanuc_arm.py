@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from flexik.cases import case as cases
-from flexik.kinematics.serial_arm import SerialArm
+from flexik.kinematics.serial_arm import SerialArm, forward, pose_errors
 from flexik.parameters.reading import read_yaml
 
 ROOT = Path(__file__).parents[1]
@@ -28,6 +28,11 @@ def random_joints(n, seed=0):
 
 def within_limits(arm, joints):
     return ((joints >= arm.minimum) & (joints <= arm.maximum)).all(axis=-1)
+
+
+def largest_error(pose, joints, arm=ARM):
+    """Largest distance in m or angle in rad between poses and those at `joints`."""
+    return max(error.max() for error in pose_errors(pose, forward(arm, joints)))
 
 
 def section(data, machine=FILES["data/machines/fanuc.yaml"]):

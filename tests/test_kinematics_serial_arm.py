@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from fanuc_arm import ARM, LIMITS, random_joints, within_limits
+from fanuc_arm import ARM, LIMITS, largest_error, random_joints, within_limits
 from scipy.spatial.transform import Rotation
 
 from flexik.kinematics.serial_arm import (
@@ -96,19 +96,13 @@ def test_the_smallest_singular_value_tells_singular_poses():
     assert smallest_singular_value(ARM, joints, LENGTH).max() < 1e-15
 
 
-def well_conditioned(joints):
-    scaled = jacobian(ARM, joints)
-    return joints[np.linalg.svd(scaled, compute_uv=False)[:, -1] > 0.05]
-
-
 def test_newton_steps_converge_quadratically_away_from_singular_poses():
-    joints = well_conditioned(random_joints(2000) * 0.9)
+    joints = random_joints(2000) * 0.9
+    joints = joints[np.linalg.svd(jacobian(ARM, joints), compute_uv=False)[:, -1] > 0.05]
     target = forward(ARM, joints)
     start = joints + np.random.default_rng(1).normal(0.0, 0.01, joints.shape)
-    errors = []
-    for n_steps in range(4):
-        found = refine(ARM, target, start, n_steps, 1e-12, LENGTH)
-        errors.append(max(error.max() for error in pose_errors(target, forward(ARM, found))))
+    found = (refine(ARM, target, start, n_steps, 1e-12, LENGTH) for n_steps in range(4))
+    errors = [largest_error(target, joints) for joints in found]
     assert errors[0] > 1e-2
     assert errors[1] < 0.1 * errors[0] and errors[2] < 0.01 * errors[1]
     assert errors[3] < 1e-6
