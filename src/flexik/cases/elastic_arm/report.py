@@ -262,7 +262,7 @@ def depths(results: Results) -> dict[str, Any]:
 
 def size_values(results: Results, name: str) -> dict[str, Any]:
     """Whether the choice is on the border, and how near to more weights than numbers."""
-    runs, kind = results.of(f"sizes/{name}"), KINDS[str(results.section.networks[name].learns)]
+    runs, kind = results.of(f"sizes/{name}"), KINDS[results.section.networks[name].learns]
     sizes, tried = results.layers(name), runs.filter(like="n_hidden").max()
     pairs = itertools.pairwise((len(kind.inputs), *sizes, len(kind.outputs)))
     n_training = int((results.readings["part"] == TRAINING).sum())

@@ -112,7 +112,7 @@ class Results:
         rows["hidden"] = [self.hidden(str(name)) for name in rows.index]
         rows["trainer"] = [network.trainer for network in networks]
         rows["gauges"] = [
-            network.readings.replace("_", "-") + EXTRA.get(str(network.learns), "")
+            network.readings.replace("_", "-") + EXTRA.get(network.learns, "")
             for network in networks
         ]
         rows["mean_errors"] = starts["mean_error"].agg(by_restart, 2)
@@ -141,7 +141,7 @@ class Results:
             if method.network is not None:
                 network = self.section.networks[method.network]
                 restarts = self.of(f"errors/{self.conditions}/{label}.restarts")
-                row["knows"] = KNOWS.get(str(network.learns), "target, payload")
+                row["knows"] = KNOWS.get(network.learns, "target, payload")
                 row["gauges"] = network.readings.replace("_", "-") if network.has_gauges else ""
                 row |= {"hidden": self.hidden(method.network), "trainer": network.trainer}
                 row["mean_errors"] = by_restart(restarts["mean_error"], 3)

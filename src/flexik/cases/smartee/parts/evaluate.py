@@ -32,7 +32,7 @@ from flexik.datasets.parts import Part, Work, Writer, rows, stacked, table, whol
 from flexik.datasets.tables import Field, read_table
 from flexik.evaluation.errors import evaluate, fields_of
 from flexik.learning.perceptron import Network
-from flexik.learning.storage import load_network, load_restarts
+from flexik.learning.storage import load_restarts
 
 N_STEPS = Field("n_steps", "1", "Newton steps at most", "int64")
 EXTENT = Field("extent", "1", "largest coordinate of the pose, in half extents of the box")
@@ -76,11 +76,10 @@ def judged(
     poses = read_table(rows)
     conditions = conditions_of(poses, centre_elbows(machine, box))
     judge = judge_of(geometry_of(machine), poses)
-    trained = None if network is None else load_network(network)[0]
     extent = extent_of(box, values(poses, POSE_FIELDS))
     tables: list[dict[str, NDArray]] = []
     for n_steps in settings.n_steps:
-        asked = method(machine, settings, n_steps, trained)
+        asked = method(machine, settings, n_steps, network)
         tables.append(evaluate(asked, conditions, judge, COLUMNS))
         tables[-1] |= {N_STEPS.name: np.full(len(poses), n_steps), EXTENT.name: extent}
     left_out = {field.name for field in (*COLUMNS.query, N_STEPS, EXTENT)}

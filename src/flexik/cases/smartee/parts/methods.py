@@ -66,10 +66,10 @@ class DirectKinematics:
 
 
 def method(
-    machine: section.Machine, settings: section.Method, n_steps: int, network: Network | None
+    machine: section.Machine, settings: section.Method, n_steps: int, network: Path | None
 ) -> DirectKinematics:
-    """Method of `settings` with one of its numbers of steps, and the network it starts from."""
-    start = settings.start if network is None else network
+    """Method of `settings` with one of its numbers of steps, from the network in a file if any."""
+    start = settings.start if network is None else load_network(network)[0]
     geometry = geometry_of(machine)
     return DirectKinematics(geometry, start, n_steps, settings.tolerance, settings.accepted)
 
@@ -86,6 +86,4 @@ def trained(chosen: Section, name: str, n_steps: int) -> DirectKinematics:
     if name not in chosen.methods or n_steps not in chosen.methods[name].n_steps:
         raise ParameterError(f"{chosen.name}.methods: there is no {name!r} of {n_steps} steps")
     settings = chosen.methods[name]
-    file = network_file(chosen, settings)
-    network = None if file is None else load_network(file)[0]
-    return method(chosen.machine, settings, n_steps, network)
+    return method(chosen.machine, settings, n_steps, network_file(chosen, settings))
