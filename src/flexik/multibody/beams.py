@@ -18,11 +18,8 @@ SECTION_COLUMNS = ("x_m", "Iz_m4", "A_m2")
 # round-off floor of the solver rises above its tolerance, m
 MERGE_DISTANCE = 0.03
 
-# Gauss-Legendre points and weights on [0, 1], a panel between two rows of a section table
-_GAUSS_X, _GAUSS_W = (
-    (np.polynomial.legendre.leggauss(4)[0] + 1) / 2,
-    np.polynomial.legendre.leggauss(4)[1] / 2,
-)
+# Gauss-Legendre points and weights on [-1, 1], a panel between two rows of a section table
+_GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(4)
 
 
 @dataclass(frozen=True)
@@ -32,14 +29,6 @@ class Section:
     abscissa: Array
     second_moment: Array
     area: Array
-
-    def second_moment_at(self, abscissa: Array) -> Array:
-        """Second moment of area about the bending axis, m4."""
-        return np.interp(abscissa, self.abscissa, self.second_moment)
-
-    def area_at(self, abscissa: Array) -> Array:
-        """Area, m2."""
-        return np.interp(abscissa, self.abscissa, self.area)
 
 
 @dataclass(frozen=True)
@@ -136,13 +125,18 @@ def _reduce(beam: Beam, stations: Array, pins: tuple[float, ...]) -> Elements:
     x, w, element = _quadrature(beam, stations)
     n = len(stations) - 1
     length = stations[1:] - stations[:-1]
-    flexibility = 1.0 / (beam.youngs_modulus * beam.section.second_moment_at(x))
+    section = beam.section
+    area = np.interp(x, section.abscissa, section.area)
+    second_moment = np.interp(x, section.abscissa, section.second_moment)
+    flexibility = 1.0 / (beam.youngs_modulus * second_moment)
     middle = (stations[:-1] + stations[1:]) / 2
     bending = _sums(element, w * flexibility, n)
-    axial = _sums(element, w / (beam.youngs_modulus * beam.section.area_at(x)), n)
+    axial = _sums(element, w / (beam.youngs_modulus * area), n)
     residual = _sums(element, w * flexibility * (x - middle[element]) ** 2, n)
 
-    weight = w * _relative_density(beam, x)
+    # density follows the area, times a linear factor
+    with_mass = (x >= beam.mass_span[0]) & (x <= beam.mass_span[1])
+    weight = w * np.where(with_mass, area, 0.0)
     moments = np.array([np.sum(weight), np.sum(weight * x), np.sum(weight * x**2)])
     factor = np.linalg.solve(
         [moments[:2], moments[1:]], [beam.mass, beam.mass * beam.centre_of_mass]
@@ -159,11 +153,6 @@ def _sums(group: NDArray[np.int64], values: Array, n_groups: int) -> Array:
     return np.bincount(group, values, n_groups).astype(np.float64)
 
 
-def _relative_density(beam: Beam, x: Array) -> Array:
-    inside = (x >= beam.mass_span[0]) & (x <= beam.mass_span[1])
-    return np.where(inside, beam.section.area_at(x), 0.0)
-
-
 def _quadrature(beam: Beam, stations: Array) -> tuple[Array, Array, NDArray[np.int64]]:
     """Abscissas, weights and element numbers; panels end at stations, table rows and mass ends."""
     cuts = np.concatenate([stations, beam.section.abscissa, beam.mass_span])
@@ -171,7 +160,7 @@ def _quadrature(beam: Beam, stations: Array) -> tuple[Array, Array, NDArray[np.i
     # np.unique, several times faster: meshes are made by the ten thousand
     cuts = cuts[np.append(True, cuts[1:] != cuts[:-1])]
     width = cuts[1:] - cuts[:-1]
-    x = (cuts[:-1, None] + width[:, None] * _GAUSS_X).ravel()
-    w = (width[:, None] * _GAUSS_W).ravel()
+    x = (cuts[:-1, None] + width[:, None] * ((_GAUSS_X + 1) / 2)).ravel()
+    w = (width[:, None] * (_GAUSS_W / 2)).ravel()
     element = np.searchsorted(stations, x, side="right") - 1
     return x, w, element
