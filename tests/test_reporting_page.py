@@ -1,5 +1,7 @@
 """Pages from templates, and reports as a whole: what is written, drawn again and removed."""
 
+from pathlib import Path
+
 import pandas as pd
 import pytest
 from hypothesis import given
@@ -176,6 +178,16 @@ def test_figures_are_drawn_again_only_if_they_changed(write):
     assert write(content()) == ["curve"] and file_checksum(path) == first
     path.write_bytes(b"damaged")
     assert write(content()) == ["curve"] and file_checksum(path) == first
+
+
+def test_processes_that_draw_get_whole_paths(template, tmp_path, monkeypatch):
+    """They may have begun in another folder."""
+    paths = []
+    monkeypatch.setattr(reports, "_draw", lambda job: paths.append(job[0]) or job[0].touch())
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "made/figures").mkdir(parents=True)
+    write_report(Path("made"), template, content(), record=Path("record.json"))
+    assert [path.parent for path in paths] == [tmp_path / "made/figures"] * 2
 
 
 def test_figures_of_other_code_are_drawn_again(write, monkeypatch):

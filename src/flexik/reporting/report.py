@@ -124,7 +124,8 @@ def _draw_all(
 ) -> dict[str, list[str]]:
     """Draw what changed; checksums of data and code, and of the PNG, by name."""
     wanted = {name: digest(drawing) for name, drawing in figures.items()}
-    paths = {name: folder / "figures" / f"{name}.png" for name in figures}
+    # absolute: processes that draw may have begun elsewhere
+    paths = {name: folder.absolute() / f"figures/{name}.png" for name in figures}
     todo = [
         name
         for name, path in paths.items()
