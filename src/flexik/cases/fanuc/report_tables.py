@@ -147,19 +147,14 @@ def _by_distance(results: Results, values: pd.Series, decimals: int) -> Table:
 
 def conditioning(results: Results) -> Table:
     """Share of the poses reached by the smallest singular value of the Jacobian there."""
-    frame, rows = results.of("random_poses"), []
-    for low, high in itertools.pairwise([0.0, *SINGULAR_EDGES, np.inf]):
-        there = frame[(frame["singular_value"] >= low) & (frame["singular_value"] < high)]
-        rates = 100.0 * there.groupby("label")["reached"].mean()
-        name = f"over {low:g}" if np.isinf(high) else f"{low:g} to {high:g}"
-        rows.append(
-            {
-                "smallest singular value (m)": name,
-                "poses": len(having(there, method=EXACT)),
-                **{name: rates.get(name, np.nan) for name in frame["label"].unique()},
-            }
-        )
-    return Table(pd.DataFrame(rows), 1)
+    frame, edges = results.of("random_poses"), [0.0, *SINGULAR_EDGES, np.inf]
+    names = [f"{low:g} to {high:g}" for low, high in itertools.pairwise(edges)]
+    names[-1] = f"over {edges[-2]:g}"
+    frame["place"] = pd.cut(frame["singular_value"], edges, right=False, labels=names)
+    rates = frame.pivot_table(index="place", columns="label", values="reached", sort=False)
+    rates = 100.0 * rates.reindex(index=names, columns=frame["label"].unique())
+    rates.insert(0, "poses", having(frame, method=EXACT)["place"].value_counts()[names])
+    return Table(rates.rename_axis("smallest singular value (m)").reset_index(), 1)
 
 
 def configurations(results: Results) -> Table:
