@@ -86,11 +86,3 @@ def test_a_table_of_columns_in_their_units():
     assert table([], {"method": "method", "n": Column("n", 0)}).csv == "method,n\n"
     with pytest.raises(DataError, match="'p95'"):
         table(rows, {"p95": mm("p95")})
-
-
-def test_files_of_a_table_are_those_that_write_table_makes(tmp_path):
-    frame = pd.DataFrame({"x": [np.pi], "n": [2]})
-    write_table(tmp_path / "t", frame, {"x": 1}, "Caption.", ["note"])
-    made = Table(frame, {"x": 1})
-    assert (tmp_path / "t.csv").read_text() == made.csv
-    assert (tmp_path / "t.md").read_text() == made.markdown("Caption.", ["note"])
