@@ -15,8 +15,9 @@ from flexik.errors import DataError, TrainingError
 from flexik.learning import training
 from flexik.learning.fit import fit
 from flexik.learning.perceptron import Quantity
+from flexik.learning.stopping import StopReason
 from flexik.learning.storage import load_network, load_restarts
-from flexik.learning.training import TRAINERS, Architecture, Lesson, StopReason, train, train_best
+from flexik.learning.training import TRAINERS, Architecture, Lesson, train, train_best
 from flexik.parameters.trainers import LevenbergMarquardt, Stopping, Trainer
 
 INPUTS = (Quantity("x", "m"), Quantity("payload", "kg"))
@@ -208,11 +209,11 @@ def test_bad_data_is_named(change, message):
 def test_more_weights_than_numbers_to_fit():
     # 4 hidden units have 4 * 3 + 2 * 5 = 22 weights, 11 samples hold 22 numbers
     train(lesson(data(11)))
-    with pytest.raises(TrainingError, match="4 hidden units have 22 weights, more than the 20"):
+    with pytest.raises(TrainingError, match="4 tanh units have 22 weights, more than the 20"):
         lesson(data(10))
     # 4 * 3 + 3 * 5 + 2 * 4 = 35 weights
     train(lesson(data(18), (4, 3)))
-    with pytest.raises(TrainingError, match="35 weights, more than the 34"):
+    with pytest.raises(TrainingError, match="4-3 tanh units have 35 weights, more than the 34"):
         lesson(data(17), (4, 3))
 
 

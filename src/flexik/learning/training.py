@@ -75,6 +75,9 @@ class Architecture:
         """Units of every hidden layer."""
         return self.n_hidden if isinstance(self.n_hidden, tuple) else (self.n_hidden,)
 
+    def __str__(self) -> str:
+        return f"{'-'.join(map(str, self.hidden_sizes))} {self.activation} units"
+
 
 @dataclass(frozen=True, eq=False)
 class Lesson:
@@ -123,7 +126,7 @@ class Lesson:
         )
         if self.outputs.size < n_weights:
             raise TrainingError(
-                f"{self.architecture.n_hidden} hidden units have {n_weights} weights, more than "
+                f"{self.architecture} have {n_weights} weights, more than "
                 f"the {self.outputs.size} numbers ({len(self.outputs)} samples of "
                 f"{self.outputs.shape[1]} outputs) there are to fit"
             )
@@ -267,10 +270,9 @@ def no_network(lesson: Lesson, records: Sequence[TrainingRecord]) -> TrainingErr
     """What to raise when no restart gave a usable network."""
     outputs = ", ".join(quantity.name for quantity in lesson.output_quantities)
     reasons = ", ".join(f"{record.restart}: {record.stop_reason}" for record in records)
-    shape = f"{lesson.architecture.n_hidden} {lesson.architecture.activation} units"
     return TrainingError(
-        f"network for {outputs} with {shape}, seed {lesson.seed}: no usable network, restarts "
-        f"ended with {reasons}"
+        f"network for {outputs} with {lesson.architecture}, seed {lesson.seed}: no usable network, "
+        f"restarts ended with {reasons}"
     )
 
 

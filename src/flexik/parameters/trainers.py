@@ -72,10 +72,10 @@ class LevenbergMarquardtAccelerated(Damped):
 
     kind: Literal["levenberg_marquardt_accelerated"] = "levenberg_marquardt_accelerated"
     n_iterations: Count = 400
-    minimum_progress: BelowOne = 1e-3
+    minimum_progress: BelowOne = 1e-2
     progress_window: Count = 10
     mu: Positive = 1e-2
-    acceleration: NotNegative = 0.75
+    acceleration: NotNegative = 1.5
 
 
 class BackPropagation(Stopping):
