@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flexik.errors import DataError
-from flexik.reporting.tables import Column, Table, markdown, mm, table, write_table
+from flexik.reporting.tables import Column, markdown, mm, table, write_table
 
 
 def test_markdown_of_numbers_texts_and_nothing():
