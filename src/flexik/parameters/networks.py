@@ -49,7 +49,7 @@ class Select(Model):
 
     n_restarts: Count = 3
     tolerance: NotNegative = 0.0
-    trainer: Name = "sizes"
+    trainer: Name = "study"
 
 
 Layer = Count | Sizes
