@@ -36,9 +36,9 @@ lint: $(VENV)/.dev ## formatting, lint and types
 	$(BIN)/mypy
 
 lock: $(VENV)/.pipeline ## after a merge that left conflicts in dvc.lock or reports/: one side, brought up to date
-	git diff --name-only --diff-filter=U -z -- dvc.lock reports | xargs -0r git checkout --ours --
+	git diff --name-only --diff-filter=U -z -- dvc.lock reports README.md | xargs -0r git checkout --ours --
 	$(BIN)/dvc repro
-	git add dvc.lock reports
+	git add dvc.lock reports README.md
 
 $(BENCHMARKS): export PYTHONPATH := src
 # one thread a process, as the stages have; the threads of torch and JAX too

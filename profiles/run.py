@@ -4,6 +4,7 @@ Usage: profiles/run.py PROFILE.yaml [FOLDER]. With FOLDER the copy is made there
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -61,8 +62,9 @@ def copy_project(folder: Path) -> None:
         raise DataError(f"{folder}: expected an empty or a new folder")
     for name in listed.stdout.splitlines():
         source, target = ROOT / name, folder / name
-        # the lock is of other parameters
-        if source.is_file() and name != "dvc.lock":  # a tracked file may be deleted in the tree
+        # lock and reports are of other parameters; a tracked file may be deleted in the tree
+        made = name == "dvc.lock" or re.match("reports/(?!benchmarks/)", name)
+        if source.is_file() and not made:
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source, target)
     subprocess.run(["git", "init", "--quiet"], cwd=folder, check=True)

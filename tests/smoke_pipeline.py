@@ -33,8 +33,8 @@ def call(project, *command, **more):
     )
 
 
-def stage(project, name, case, **more):
-    return call(project, sys.executable, f"stages/{name}.py", case, **more)
+def stage(project, name, *case, **more):
+    return call(project, sys.executable, f"stages/{name}.py", *case, **more)
 
 
 def reproduce(project, *stages):

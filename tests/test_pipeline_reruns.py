@@ -1,6 +1,7 @@
 """The whole pipeline on the smoke profile: what it computes again, and how it fails."""
 
 import contextlib
+import json
 import os
 import shutil
 import signal
@@ -38,7 +39,8 @@ def succeeded(done):
 def test_run_again_it_does_nothing_but_look(project):
     before = snapshot(project)
     assert stages_run(succeeded(reproduce(project))) == {"validate"}
-    assert not changed(before, snapshot(project)) - {"data/validated.txt"}
+    again = changed(before, snapshot(project))
+    assert all(name.startswith("data/validated") for name in again)
 
 
 def test_an_edited_method_is_all_that_is_computed_again(copy):
@@ -82,7 +84,9 @@ def test_code_counts(copy):
         *(f"report@{case}" for case in CASES),
     }
     again = changed(before, snapshot(copy, "data"))
-    assert all(name.endswith(("report.json", "validated.txt")) for name in again)
+    assert {name for name in again if not name.startswith("data/validated")} == {
+        f"data/{case}/report.json" for case in CASES
+    }
 
     append(copy / "src/flexik/learning/accelerated.py", "\n# another step\n")
     done = succeeded(stage(copy, "train", "crane"))
@@ -92,6 +96,17 @@ def test_code_counts(copy):
     assert {
         f"data/crane/networks/{name}.part" for name in PARAMETERS["crane"]["networks"]
     } == trained
+
+
+def test_a_default_and_a_file_of_the_user_count(copy):
+    networks = copy / "src/flexik/parameters/networks.py"
+    networks.write_text(networks.read_text().replace("seed: Seed = 1", "seed: Seed = 2"))
+    own = copy / "own.csv"
+    shutil.copyfile(copy / "data/reference/crane/campaign_example.csv", own)
+    edit(copy, crane__studies__measured__campaign__file="own.csv")
+    succeeded(stage(copy, "validate"))
+    found = json.loads(succeeded(call(copy, "dvc", "status", "--json")).stdout)
+    assert {"train@crane", "select@crane", "study@crane"} <= set(found)
 
 
 def test_a_wrong_parameter_is_one_line_and_nothing_is_lost(copy):
@@ -170,7 +185,12 @@ def test_killed_and_run_again_generates_the_same_bytes(copy, tmp_path):
 def test_a_part_that_fails_leaves_the_others(copy):
     # no crane holds the heavier half of the grid
     payload = {"minimum": 100.0, "maximum": 1.0e7, "increment": 9.9999e6}
-    edit(copy, crane__samples__grid__payload=payload, crane__samples__selection__seed=12)
+    edit(
+        copy,
+        crane__samples__grid__payload=payload,
+        crane__samples__selection__seed=12,
+        crane__studies__fitting__payload=100.0,
+    )
     before = snapshot(copy, "data/crane/samples")
     done = stage(copy, "generate", "crane")
     assert done.returncode == 1

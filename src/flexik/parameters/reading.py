@@ -43,7 +43,7 @@ def validated(model: type[T], data: Any, source: Callable[[list[str]], tuple[str
         found = []
         for detail in error.errors():
             location = _keys(detail["loc"], data, detail["type"] == "missing")
-            message = detail["msg"].removeprefix("Value error, ")
+            message = _MESSAGES.get(detail["type"], detail["msg"]).removeprefix("Value error, ")
             if detail["type"] == "value_error":  # our own: "key within the section: what is wrong"
                 within, _, message = message.partition(": ")
                 location += within.split(".")
@@ -57,6 +57,12 @@ def validated(model: type[T], data: Any, source: Callable[[list[str]], tuple[str
         raise ParameterError("\n".join(lines)) from None
 
 
+# In place of pydantic's own words
+_MESSAGES = {
+    "extra_forbidden": "there is no such key",
+    "missing": "this key is missing",
+    "union_tag_not_found": "the key that says which kind it is is missing or names none",
+}
 _OF_TYPE = ("_type", "_parsing", "_from_float")
 Mistake = tuple[list[str], bool, str]
 

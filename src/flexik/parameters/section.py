@@ -31,6 +31,11 @@ class CaseSection(Model):
         return REPORTS / self.name
 
     @property
+    def files(self) -> list[Path]:
+        """Files that the section names, which count by their content."""
+        return []
+
+    @property
     def machine_file(self) -> Path:
         """The file that describes the machine."""
         return MACHINES / f"{self.name}.yaml"

@@ -1,6 +1,7 @@
 """The section `crane` of params.yaml."""
 
 import math
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -151,6 +152,13 @@ class Section(CaseSection):
     methods: Methods
     studies: Studies
 
+    @property
+    def files(self) -> list[Path]:
+        """Section tables, and a campaign of the user's own."""
+        own = self.studies.measured.campaign.file
+        tables = self.machine.structure.beams.sections.values()
+        return [Path(file) for file in (*tables, *([] if own is None else [own]))]
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         self._check_strokes()
@@ -228,12 +236,12 @@ def check(section: Section) -> None:
             read_section(path)
         except DataError as error:
             raise ParameterError(
-                f"data/machines/crane.yaml: structure.beams.{name}.section: {error}"
+                f"{section.machine_file}: structure.beams.{name}.section: {error}"
             ) from None
     try:
         check_assembly(geometry)
     except ParameterError as error:
-        raise ParameterError(f"data/machines/crane.yaml: geometry: {error}") from None
+        raise ParameterError(f"{section.machine_file}: geometry: {error}") from None
     measured = section.studies.measured
     sets = {f"conditions.{name}": given for name, given in section.conditions.items()} | {
         "calibration.conditions": section.calibration.conditions,
@@ -248,14 +256,16 @@ def check(section: Section) -> None:
                 x, y = points[missed[0]]
                 others = f", nor {missed.size - 1} others" if missed.size > 1 else ""
                 raise ParameterError(
-                    f"params.yaml: crane.{key}.points.{missed[0]}: the rigid crane does not reach "
-                    f"({x:g}, {y:g}) m{others}"
+                    f"params.yaml: {section.name}.{key}.points.{missed[0]}: the rigid crane does "
+                    f"not reach ({x:g}, {y:g}) m{others}"
                 )
             continue
         x, y = (axis.ravel() for axis in np.meshgrid(*(np.linspace(*a, 60) for a in _area(given))))
         raster = np.column_stack([x, y])[x >= section.samples.minimum_tip_x]
         if np.isnan(smallest_extension(geometry, raster)).all():
-            raise ParameterError(f"params.yaml: crane.{key}: the crane reaches nothing in x, y")
+            raise ParameterError(
+                f"params.yaml: {section.name}.{key}: the crane reaches nothing in x, y"
+            )
     if measured.campaign.file is not None:
         own_campaign(measured.campaign.file, geometry)
 

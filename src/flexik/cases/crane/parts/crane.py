@@ -15,13 +15,11 @@ from flexik.multibody.crane.model import tips
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning.method import Columns
 
-DATA = Path("data/crane")
-SPRING = DATA / "constants/spring.json"
-
 
 def model_inputs(section: Section) -> dict[str, Any]:
     """Inputs `spring` and `sections` of a part that solves the flexible crane."""
-    return {"spring": SPRING, "sections": section.machine.structure.beams.sections}
+    spring = section.data / "constants/spring.json"
+    return {"spring": spring, "sections": section.machine.structure.beams.sections}
 
 
 def flexible(machine: Machine, spring: Path) -> FlexibleCrane:

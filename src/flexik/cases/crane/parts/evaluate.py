@@ -17,8 +17,6 @@ from flexik.cases.crane.parts.conditions import at, at_points
 from flexik.cases.crane.parts.crane import columns_of, flexible, model_inputs, sorted_tips
 from flexik.cases.crane.parts.fields import TARGET_FIELDS
 from flexik.cases.crane.parts.methods import (
-    NETWORKS,
-    SAMPLES,
     method_inputs,
     method_settings,
     trained_method,
@@ -69,10 +67,10 @@ def _part(section: Section, conditions: str, name: str) -> Part:
         settings["points"] = given
         # a genetic algorithm takes too long to be asked again with every network
         if method.network is not None and getattr(method, "genetic", None) is None:
-            inputs["restarts"] = NETWORKS / f"{method.network}.restarts.json"
+            inputs["restarts"] = section.data / "networks" / f"{method.network}.restarts.json"
     else:
         settings["n_targets"] = method.n_targets
-        inputs["targets"] = SAMPLES / f"{conditions}.parquet"
+        inputs["targets"] = section.data / "samples" / f"{conditions}.parquet"
     return Part(f"{conditions}/{name}", prepare, settings, inputs)
 
 

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from flexik.cases.crane.parts.crane import flexible, model_inputs
 from flexik.cases.crane.parts.fields import INPUTS, SAMPLE_FIELDS, deflection, kept, on_line
 from flexik.cases.crane.parts.learning import KINDS
-from flexik.cases.crane.parts.methods import SAMPLES
 from flexik.cases.crane.section import Fitting, Section
 from flexik.datasets.parts import Part, Work, Writer, stacked, table
 from flexik.datasets.tables import Field, read_table
@@ -44,7 +43,7 @@ def part(section: Section) -> Part:
         "study": study,
         "trainer": section.trainers[study.trainer],
     }
-    inputs = {**model_inputs(section), "grid": SAMPLES / "grid.parquet"}
+    inputs = {**model_inputs(section), "grid": section.data / "samples/grid.parquet"}
     return Part("fitting", prepare, settings, inputs)
 
 

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from flexik.cases.crane.parts.crane import DATA
 from flexik.cases.crane.section import Section
 from flexik.datasets.tables import read_table
 from flexik.errors import ParameterError
@@ -13,8 +12,6 @@ from flexik.kinematics.manipulator import Manipulator
 from flexik.learning.storage import load_network
 from flexik.positioning.method import Ingredients, Method, Network, Settings
 from flexik.positioning.registry import Build, build_of
-
-NETWORKS, SAMPLES = DATA / "networks", DATA / "samples"
 
 
 def method_settings(section: Section, name: str) -> dict[str, Any]:
@@ -26,9 +23,10 @@ def method_settings(section: Section, name: str) -> dict[str, Any]:
 def method_inputs(section: Section, name: str) -> dict[str, Any]:
     """Inputs `network` and `samples`, those that method `name` is built from."""
     method = section.methods[name]
-    inputs: dict[str, Any] = {"samples": {n: SAMPLES / f"{n}.parquet" for n in method.reads}}
+    samples = {name: section.data / "samples" / f"{name}.parquet" for name in method.reads}
+    inputs: dict[str, Any] = {"samples": samples}
     if method.network is not None:
-        inputs["network"] = NETWORKS / f"{method.network}.json"
+        inputs["network"] = section.data / "networks" / f"{method.network}.json"
     return inputs
 
 
@@ -53,7 +51,7 @@ def method_of(section: Section, name: str) -> Method:
     """
     if name not in section.methods:
         known = ", ".join(section.methods)
-        raise ParameterError(f"crane.methods: there is no {name!r} ({known})")
+        raise ParameterError(f"{section.name}.methods: there is no {name!r} ({known})")
     manipulator = CraneManipulator(section.machine.geometry)
     inputs = method_inputs(section, name)
     return trained_method(**method_settings(section, name), manipulator=manipulator, **inputs)

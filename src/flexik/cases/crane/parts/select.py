@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from flexik.cases.crane.parts.learning import lesson
-from flexik.cases.crane.parts.train import SIZES, data_inputs, described, part
+from flexik.cases.crane.parts.train import data_inputs, described, part
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part, Work
 from flexik.learning.size_selection import select
@@ -23,7 +23,8 @@ def parts(section: Section) -> list[Part]:
     """A part a network whose size is to be chosen, and `corrected/RIGID` for corrections."""
     selected = {n: network for n, network in section.networks.items() if network.is_selected}
     corrected = sorted({n.corrects for n in selected.values() if n.corrects is not None})
-    found = [part(section, name, f"{CORRECTED}/{name}", SIZES) for name in corrected]
+    sizes = section.data / "sizes"
+    found = [part(section, name, f"{CORRECTED}/{name}", sizes) for name in corrected]
     for name, network in selected.items():
         settings = described(section, name) | {
             "activation": network.activation,
@@ -32,9 +33,9 @@ def parts(section: Section) -> list[Part]:
             "tolerance": network.select.tolerance,
             "trainer": section.trainers[network.select.trainer],
         }
-        inputs: dict[str, Any] = data_inputs()
+        inputs: dict[str, Any] = data_inputs(section)
         if network.corrects is not None:
-            inputs["rigid"] = SIZES / CORRECTED / f"{network.corrects}.json"
+            inputs["rigid"] = sizes / CORRECTED / f"{network.corrects}.json"
         found.append(Part(name, prepare, settings, inputs))
     return found
 

@@ -17,12 +17,10 @@ from flexik.learning.training import Architecture
 from flexik.machines.crane import CraneGeometry
 from flexik.parameters.trainers import Stopping
 
-NETWORKS, SAMPLES, SIZES = (Path("data/crane") / name for name in ("networks", "samples", "sizes"))
-
 
 def parts(section: Section) -> list[Part]:
     """A part a network."""
-    return [part(section, name, name, NETWORKS) for name in section.networks]
+    return [part(section, name, name, section.data / "networks") for name in section.networks]
 
 
 def part(section: Section, name: str, as_name: str, rigid_folder: Path) -> Part:
@@ -34,9 +32,9 @@ def part(section: Section, name: str, as_name: str, rigid_folder: Path) -> Part:
         "n_restarts": network.n_restarts,
         "trainer": section.trainers[network.trainer],
     }
-    inputs: dict[str, Any] = data_inputs()
+    inputs: dict[str, Any] = data_inputs(section)
     if network.is_selected:
-        inputs["size"] = SIZES / f"{name}.json"
+        inputs["size"] = section.data / "sizes" / f"{name}.json"
     if network.corrects is not None:
         inputs["rigid"] = rigid_folder / f"{network.corrects}.json"
     return Part(as_name, prepare, settings, inputs)
@@ -52,9 +50,9 @@ def described(section: Section, name: str) -> dict[str, Any]:
     }
 
 
-def data_inputs() -> dict[str, Any]:
+def data_inputs(section: Section) -> dict[str, Any]:
     """Tables to learn from and to choose by."""
-    return {name: SAMPLES / f"{name}.parquet" for name in ("grid", "selection")}
+    return {name: section.data / "samples" / f"{name}.parquet" for name in ("grid", "selection")}
 
 
 def prepare(

@@ -2,13 +2,11 @@
 
 from typing import Any
 
-from flexik.cases.crane.parts.crane import DATA, model_inputs
+from flexik.cases.crane.parts.crane import model_inputs
 from flexik.cases.crane.parts.measured import adaptation, budget, campaign, identified
-from flexik.cases.crane.parts.methods import NETWORKS, method_settings
+from flexik.cases.crane.parts.methods import method_settings
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part
-
-CAMPAIGN = DATA / "studies/measured/campaign.parquet"
 
 
 def measured_parts(section: Section) -> list[Part]:
@@ -16,11 +14,11 @@ def measured_parts(section: Section) -> list[Part]:
     measured, machine = section.studies.measured, section.machine
     # what stands in for a crane does not hang on whether there is one
     built = measured.campaign.model_copy(update={"file": None})
-    model = model_inputs(section)
+    model, trained_in = model_inputs(section), section.data / "networks"
     names = measured.methods
     methods = {name: method_settings(section, name)["method"] for name in names.values()}
     adapted, method = methods[names["adaptation"]], methods[names["campaign"]]
-    trained = NETWORKS / f"{method.network}.json"
+    trained = trained_in / f"{method.network}.json"
     # a genetic algorithm takes too long to be asked again with every network
     restarts = None if method.genetic else trained.with_suffix(".restarts.json")
     compensated = {"machine": machine, "campaign": built, "method": method}
@@ -42,8 +40,11 @@ def measured_parts(section: Section) -> list[Part]:
         # the one that is adapted comes first
         "methods": {name: methods[name] for name in reversed(names.values())},
     }
-    networks = {name: NETWORKS / f"{given.network}.json" for name, given in methods.items()}
-    other = model | {"network": networks[names["adaptation"]], "campaign": CAMPAIGN}
+    networks = {name: trained_in / f"{given.network}.json" for name, given in methods.items()}
+    other = model | {
+        "network": networks[names["adaptation"]],
+        "campaign": section.data / "studies/measured/campaign.parquet",
+    }
     every = inputs | ({} if restarts is None else {"restarts": restarts})
     return [
         made,
