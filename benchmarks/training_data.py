@@ -36,9 +36,10 @@ def crane_lesson(network: str) -> Lesson:
 
     Raises DataError when the pipeline has not made them.
     """
-    geometry = load("crane").machine.geometry
+    section = load("crane")
+    geometry = section.machine.geometry
     architecture = Architecture(1, ACTIVATION)
-    return lesson(NETWORKS[network], architecture, OURS(), SEED, geometry, **data_inputs())
+    return lesson(NETWORKS[network], architecture, OURS(), SEED, geometry, **data_inputs(section))
 
 
 def columns(n: int) -> list[Quantity]:
