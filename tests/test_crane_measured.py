@@ -14,7 +14,6 @@ from flexik.cases.crane.measured_figures import campaign_figures, named_points
 from flexik.cases.crane.measured_results import Measured, jib_pushes
 from flexik.cases.crane.measured_section import Measured as Section
 from flexik.cases.crane.measured_tables import MOVED, point_table, tables
-from flexik.cases.crane.parts.crane import DATA
 from flexik.cases.crane.parts.measured import adaptation, budget, identified
 from flexik.cases.crane.parts.measured.fields import CAMPAIGN, STROKES
 from flexik.cases.crane.parts.measured.parts import measured_parts
@@ -161,7 +160,7 @@ def test_a_campaign_of_a_file_leaves_the_other_studies_as_they_are():
     for name in built.keys() - {"measured/campaign"}:
         assert (built[name].settings, built[name].inputs) == (own[name].settings, own[name].inputs)
     assert own["measured/identified"].inputs["campaign"] == (
-        DATA / "studies/measured/campaign.parquet"
+        SECTION.data / "studies/measured/campaign.parquet"
     )
 
 
@@ -357,6 +356,10 @@ def test_metrics_are_means_over_all(results):
     assert found["measured.reference.combined.mean_error_mm"] == pytest.approx(0.0)
     assert found["measured.unadapted.combined_selected.mean_error_mm"] == pytest.approx(35.0)
     assert found["measured.adapted_9.mean_error_mm"] == pytest.approx(15.0)
+    cranes = results.budget_means.query("deviation == 'all'")["combined"]
+    for which, value in {"": cranes.mean(), "least_": min(cranes), "largest_": max(cranes)}.items():
+        name = f"measured.cranes.combined.{which}mean_error_mm"
+        assert found[name] == pytest.approx(1e3 * value, abs=1e-3)
     assert found["measured.cranes.none.mean_error_mm"] == pytest.approx(10.0)
     assert found["measured.prediction.nominal.mean_error_mm"] == pytest.approx(107.0)
     unknown = results.campaign.assign(target_x=np.nan, target_y=np.nan, method="")

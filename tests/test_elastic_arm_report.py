@@ -143,6 +143,7 @@ def test_sentences_follow_the_data(project, page, monkeypatch, tmp_path):
     assert "one layer `one_layer_" in page and "several `" in page
     assert page.count("on held-out readings, whose payloads it learnt from") == 6
     assert page.count("told 0.05 kg more than there is") == 4
+    assert "over its 1 restarts" not in page
     assert "Layer 2: the choice is the largest that was tried." in page
     assert (
         "With one input off by what the assumed gauges leave uncertain it depends most on" in page
@@ -155,6 +156,28 @@ def test_sentences_follow_the_data(project, page, monkeypatch, tmp_path):
     page = (tmp_path / "elastic_arm/README.md").read_text()
     assert "Published R of theta_1, -1.000000: reached by the main division" in page
     assert "reached in 2 of 2" in page and "reached in 0 of 2" in page
+
+
+def test_a_mean_stands_beside_its_range_over_the_restarts(project, monkeypatch, tmp_path):
+    of, name = report_results.Results.of, "errors/workspace/combined_iterated.restarts"
+
+    def of_two(self, which):
+        found = of(self, which)
+        if which == name:
+            other = found.assign(mean_error=0.00025, restart=1, chosen=0)
+            return pd.concat([found, other], ignore_index=True)
+        return found
+
+    monkeypatch.setattr(report_results.Results, "of", of_two)
+    monkeypatch.setattr("flexik.parameters.section.REPORTS", tmp_path)
+    report(project[1])
+    page = (tmp_path / "elastic_arm/README.md").read_text()
+    own = 1e3 * data(project, name)["mean_error"].iloc[0]
+    least, largest = sorted([own, 0.25])
+    assert (
+        f"in place of {own:.3f} mm ({least:.3f} mm to {largest:.3f} mm over its 2 restarts)."
+        in page
+    )
 
 
 def test_report_is_whole_and_the_same_again(project):

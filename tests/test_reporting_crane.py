@@ -216,6 +216,25 @@ def test_the_calibration_names_what_misses_and_the_worst_point(results, text):
     assert re.search(r"More than 10 % .*mean \|dX\| \(mm\) by \+307\.\d %", notes)
 
 
+def test_a_ground_spring_that_is_given_was_not_fitted(results, text):
+    fitted = text(results)
+    assert "the one constant that is fitted." in fitted and "mean R is what was fitted." in fitted
+    known = results.section.calibration.model_copy(update={"stiffness": 8e6})
+    given = results.section.model_copy(update={"calibration": known})
+    page = text(replace(results, section=given))
+    assert "Ground spring 8.000 MN m/rad, as given, not fitted." in page
+    assert "with the ground spring as given; nothing was fitted." in page
+    assert "constant that is fitted" not in page and "what was fitted" not in page
+
+
+def test_errors_at_random_targets_refer_to_the_restarts(results, text):
+    assert "under the published conditions: [restarts.csv](restarts.csv)." in text(
+        results, "workspace"
+    )
+    alone = text(replace(results, spread={}), "workspace")
+    assert "single targets" in alone and "restarts.csv" not in alone
+
+
 def test_the_choice_of_a_size_is_told(results, text):
     name = "size_selection/direct_selected"
     assert text(results, name).endswith("- chosen: 20, published: 18\n")

@@ -38,7 +38,7 @@ def overview() -> str:
 
     Columns of cases/NAME/overview.csv: case, what (with its unit), metric (with * the mean of all
     that match), form of the number, scale to the unit, published (FILE ROW COLUMN [SCALE] in
-    data/reference/NAME, or a text).
+    data/reference/NAME, or a text); optional: spread (two metrics, from and to, in brackets).
     """
     rows = []
     for file in sorted(CASES.glob("*/overview.csv")):
@@ -47,16 +47,29 @@ def overview() -> str:
             entries = list(csv.DictReader(lines))
         for entry in entries:
             found = [v for name, v in metrics.items() if fnmatch(name, entry["metric"])]
-            value = float(entry["scale"]) * sum(found) / len(found) if found else None
+            value = _number(sum(found) / len(found), entry) if found else ABSENT
             rows.append(
                 {
                     "case": entry["case"],
                     "what": entry["what"],
                     "published": _published(file.parent.name, entry["published"]),
-                    "flexik": ABSENT if value is None else format(value, entry["form"]),
+                    "flexik": value + (_spread(metrics, entry) if found else ""),
                 }
             )
     return markdown(pd.DataFrame(rows))
+
+
+def _number(value: float, entry: dict[str, str]) -> str:
+    return format(float(entry["scale"]) * value, entry["form"])
+
+
+def _spread(metrics: dict[str, float], entry: dict[str, str]) -> str:
+    """The two metrics that `spread` names, if it does and the run has both."""
+    ends = [metrics.get(name) for name in (entry.get("spread") or "").split()]
+    if not ends or None in ends:
+        return ""
+    low, high = (_number(float(end), entry) for end in ends if end is not None)
+    return f" ({low} to {high})"
 
 
 def _published(case: str, where: str) -> str:

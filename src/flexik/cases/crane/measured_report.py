@@ -58,7 +58,7 @@ def goals(results: Measured) -> dict[int, float]:
 
 
 def metrics(results: Measured) -> dict[str, float]:
-    """Mean errors of the campaign, and over all cranes, in mm."""
+    """Mean errors of the campaign, and over all cranes with least and largest, in mm."""
     found: dict[str, float] = {}
     whole = results.budget_means.query("deviation == 'all'")
     for prefix, end in (("", ""), ("reference.", "_reference")):
@@ -67,7 +67,10 @@ def metrics(results: Measured) -> dict[str, float]:
                 column = f"{end[1:]}_error".lstrip("_")
                 mean = errors.loc[errors["method"] == method, column].mean()
                 found[f"{prefix}{method}.mean_error"] = mean
-            found[f"cranes.{prefix}{method}.mean_error"] = whole[f"{method}{end}"].mean()
+            cranes = whole[f"{method}{end}"]
+            found[f"cranes.{prefix}{method}.mean_error"] = cranes.mean()
+            found[f"cranes.{prefix}{method}.least_mean_error"] = cranes.min()
+            found[f"cranes.{prefix}{method}.largest_mean_error"] = cranes.max()
     groups = results.adapted.groupby(["method", "n_measurements"])[["mean_error", "p95_error"]]
     for row in groups.mean().reset_index().to_dict("records"):
         label, n = row["method"], row["n_measurements"]

@@ -177,15 +177,18 @@ def _long_ratios(results: Results) -> list[str]:
 
 def _other_constants(results: Results) -> dict[str, Any]:
     """How much hangs on the constants the paper does not give."""
-    chosen, shares = results.section.studies.sensitivity, sensitivity(results)["success (%)"]
+    chosen, pairs = results.section.studies.sensitivity, sensitivity(results)
+    trainer: Any = results.section.trainers[chosen.trainer]
+    own = {"p": f"{trainer.penalty:g}", "tau": f"{trainer.penalty_decrease:g}"}
+    shares = pairs.loc[(pairs[list(own)] != pd.Series(own)).any(axis=1), "success (%)"]
     same = results.starts.query("spread == @chosen.spread and start < @chosen.n_starts")
     medians = same.groupby("trainer")["error"].median()
     errors = results.sensitivity.groupby("trainer")["error"].median()
     without = float(medians.get(UNPENALISED, np.nan))
     return {
         "chosen": chosen,
-        "trainer": results.section.trainers[chosen.trainer],
-        "shares": [shares.min(), shares.max()],
+        "trainer": trainer,
+        "shares": [shares.min(), shares.max()] if len(shares) else [],
         "without": without,
         "n_lower": int((errors < without).sum()),
         "n_pairs": len(errors),
