@@ -175,7 +175,7 @@ STUDIES = ("studies", "starts")
         (("conditions", "validation", "seed"), 3, r"validation\.seed: 3 is that of samples\.poses"),
         (("conditions", "random", "permutations"), "legs", "expected none"),
         (("conditions", "random", "n_poses"), 10**12, "less than or equal to 1000000"),
-        (("conditions", "corners", "kind"), "path", "this key is missing"),
+        (("conditions", "corners", "kind"), "path", "Field required"),
         (("conditions", "outside", "extent"), 1.0, "greater than 1"),
         (("conditions", "path_100", "cycles"), [1, 2, 3], "at least 6 items"),
         (("conditions", "restarts"), {"kind": "corners"}, "the name is taken"),
