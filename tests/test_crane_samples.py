@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from flexik.cases.crane.parts import samples as module
 from flexik.cases.crane.parts import targets
-from flexik.cases.crane.parts.crane import sorted_tips
 from flexik.cases.crane.parts.fields import (
     FAILED,
     INPUTS,
@@ -206,16 +205,16 @@ def commanded(geometry):
 
 def test_tips_of_one_extension_together_are_the_tips_in_their_order(crane, commanded):
     strokes, payload = commanded
-    found = sorted_tips(crane, strokes, payload)
+    found = tips(crane, strokes, payload)
     alone = [tips(crane, strokes[[i]], payload[[i]])[0] for i in range(len(payload))]
     assert found == pytest.approx(np.array(alone), abs=2e-7)
     assert found[3] == pytest.approx(found[-1], abs=2e-7)
     order = np.random.default_rng(5).permutation(len(payload))
-    again = sorted_tips(crane, strokes[order], payload[order])
+    again = tips(crane, strokes[order], payload[order])
     assert again == pytest.approx(found[order], abs=2e-7)
-    assert sorted_tips(crane, np.empty((0, 3)), np.empty(0)).shape == (0, 2)
+    assert tips(crane, np.empty((0, 3)), np.empty(0)).shape == (0, 2)
     with pytest.raises(SolverError):
-        sorted_tips(crane, strokes, np.where(np.arange(len(payload)) == 2, 1e7, payload))
+        tips(crane, strokes, np.where(np.arange(len(payload)) == 2, 1e7, payload))
 
 
 def test_strokes_that_do_not_assemble_fail_and_are_not_left_out(crane):

@@ -25,7 +25,7 @@ def cantilever(element, beam, force, offset=0.0, upright=False):
     angle = np.pi / 2 if upright else 0.0
     container = exu.SystemContainer()
     system = container.AddSystem()
-    placed = place_beam(system, element, discretise(beam, ()), np.zeros(2), angle)
+    placed = place_beam(system, element, discretise(beam, [()])[0], np.zeros(2), angle)
     ground = system.AddNode(item.NodePointGround())
     fixed = system.AddMarker(item.MarkerNodeCoordinate(nodeNumber=ground, coordinate=0))
     # position, and rotation or the component of the slope vector across the axis
@@ -115,7 +115,7 @@ def test_tapered_cantilever_by_the_unit_load(element):
 )
 def test_elements_keep_mass_centre_and_flexibility(pins, n_elements, mass, centre, refinement):
     beam = Beam(UNIFORM, 210e9, (0.0, LENGTH), mass, centre, (0.0, LENGTH), 0.0, n_elements)
-    elements = discretise(beam, tuple(pins), refinement)
+    elements = discretise(beam, [tuple(pins)], refinement)[0]
     length = np.diff(elements.stations)
     assert (length > 0).all()
     assert length.max() <= LENGTH / (n_elements * refinement) * (1 + 1e-6)

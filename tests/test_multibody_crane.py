@@ -119,7 +119,7 @@ def test_rows_do_not_depend_on_the_extensions_before_them(crane, geometry, eleme
     together, failures = solve(variant, strokes, payload)
     assert list(failures) == [10]
     alone = [solve(variant, strokes[k], payload[k : k + 1])[0][0] for k in range(52)]
-    np.testing.assert_array_equal(together, alone)
+    assert together == pytest.approx(np.array(alone), abs=1e-7, nan_ok=True)
 
 
 def test_a_failure_is_raised_with_its_strokes_and_payload(crane):
@@ -148,4 +148,4 @@ def test_a_model_is_placed_anew_without_memory(crane):
         first.place(np.array(strokes))
         first.solve(300.0)
     fresh = tips(crane, np.array([[0.5, 0.1, 0.4]]), np.array([300.0]))
-    assert first.tip() == pytest.approx(fresh[0], abs=1e-9)
+    assert first.tip() == pytest.approx(fresh[0], abs=1e-7)

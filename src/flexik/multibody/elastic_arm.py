@@ -83,7 +83,8 @@ class FlexibleArm:
         beam = Beam(
             section, self.youngs_modulus, span, mass, length / 2, span, 0.0, self.n_elements
         )
-        return discretise(beam, (self.deflection_stations[link], self.strain_stations[link]))
+        pins = self.deflection_stations[link], self.strain_stations[link]
+        return discretise(beam, [pins])[0]
 
 
 class Equilibria(NamedTuple):

@@ -12,6 +12,7 @@ from typing import Any
 
 import exudyn as exu
 import numpy as np
+from numpy.typing import NDArray
 
 from flexik.multibody.beams import Array, Elements, nearest
 
@@ -113,6 +114,19 @@ class PlacedBeam:
         for node, reference in zip(self.nodes, references, strict=True):
             self.system.SetNodeParameter(node, "referenceCoordinates", reference)
 
+    @property
+    def n_coordinates(self) -> int:
+        """Coordinates of all nodes."""
+        return len(self.nodes) * (4 if self.ancf else 3)
+
+    def turned(self, displacements: Array, by: float) -> Array:
+        """Displacements of all nodes (n_coordinates,) of the beam when it is turned `by` rad."""
+        turned = displacements.reshape(len(self.nodes), -1).copy()
+        c, s = np.cos(by), np.sin(by)
+        for k in range(0, turned.shape[1] - 1, 2):  # positions, of ANCF nodes slopes too
+            turned[:, k : k + 2] = turned[:, k : k + 2] @ np.array([[c, s], [-s, c]])
+        return turned.ravel()
+
     def shape(self) -> Array:
         """Node positions (m + 1, 2) in m of the current solution."""
         position = exu.OutputVariableType.Position
@@ -165,6 +179,29 @@ def solved(system: exu.MainSystem, settings: exu.SimulationSettings) -> bool:
     except exu.SolverError:  # a singular matrix
         return False
     return bool(found) and bool(np.isfinite(system.systemData.GetODE2Coordinates()).all())
+
+
+def neighbours(coordinates: Array, payload: Array) -> NDArray[np.int64]:
+    """Order (n,) in which each sample of coordinates (n, k) and payload (n,) is near the last one.
+
+    To and fro in cells; those of equal coordinates follow each other by their payload.
+    """
+    if not len(payload):
+        return np.zeros(0, dtype=np.int64)
+    places, group = np.unique(coordinates, axis=0, return_inverse=True)
+    least = np.full(len(places), np.inf)
+    np.minimum.at(least, group, payload)
+    points = np.column_stack([least, places[:, ::-1]])
+    n_cells = max(1, round(len(points) ** (1 / points.shape[1])))
+    size = np.ptp(points, axis=0)
+    share = (points - points.min(axis=0)) / np.where(size > 0.0, size, 1.0)
+    cells = np.minimum((n_cells * share).astype(np.int64), n_cells - 1)
+    for k in range(1, points.shape[1]):
+        back = cells[:, :k].sum(axis=1) % 2 == 1
+        cells[back, k] = n_cells - 1 - cells[back, k]
+    rank = np.empty(len(points), dtype=np.int64)
+    rank[np.lexsort(cells.T[::-1])] = np.arange(len(points))
+    return np.lexsort((payload, rank[group]))
 
 
 def _references(ancf: bool, stations: Array, origin: Array, angle: float) -> list[list[float]]:

@@ -23,7 +23,7 @@ from flexik.kinematics.crane import (
 from flexik.machines.crane import Rod
 from flexik.multibody.beams import Array, Elements
 from flexik.multibody.crane.structure import SLIDING, FlexibleCrane, Meshes, beam_meshes
-from flexik.multibody.elements import hang, place_beam, solved, static_settings, weigh
+from flexik.multibody.elements import hang, neighbours, place_beam, solved, static_settings, weigh
 from flexik.parameters.model import Vector
 
 # Newton's residual, N and N m: it falls quadratically onto a round-off floor of about 1e-4 (stiff
@@ -62,38 +62,41 @@ def solve(
 ) -> tuple[Array, dict[int, SolverError]]:
     """Tip (n, 2) in m at `strokes` (n, 3) in m with `payload` (n,) in kg, and the rows that failed.
 
-    Rows in a run of equal strokes are solved one from the other; rows whose meshes have the same
-    layout share one system. Each run of strokes starts from the unloaded pose. A row without
-    equilibrium holds NaN and is in the second result, with an error that names its strokes and
-    payload. `settle` finds it in place of `CraneModel.solve`, told the number of the row.
+    Rows whose meshes have the same layout share one system, each starting from a neighbour; which
+    one changes a tip by less than 1e-7 m. A row without equilibrium holds NaN and is in the second
+    result, with an error that names its strokes and payload. `settle` finds it in place of
+    `CraneModel.solve`, told the number of the row.
     """
     strokes, payload = np.atleast_2d(strokes), np.atleast_1d(payload)
     poses = pose(crane.geometry, strokes)
     result = np.full((len(strokes), 2), np.nan)
     failures: dict[int, SolverError] = {}
     models: dict[tuple[tuple[int, ...], ...], CraneModel] = {}
-    model: CraneModel | None = None
-    for k, (row, mass) in enumerate(zip(strokes, payload, strict=True)):
-        if model is None or row[2] != model.extension:
-            extension = float(row[2])
-            meshes = beam_meshes(crane, extension, SLIDING)
+    order = neighbours(strokes, payload)
+    changed = order[np.diff(strokes[order, 2], prepend=np.nan) != 0.0]
+    new = zip(changed.tolist(), beam_meshes(crane, strokes[changed, 2], SLIDING), strict=True)
+    meshes_at = dict(new)
+    model: CraneModel
+    for k in order.tolist():
+        row, mass = strokes[k], float(payload[k])
+        if meshes := meshes_at.get(k):
             layout = tuple((len(mesh.stations), *mesh.pins) for mesh in meshes.values())
             if layout in models:
-                models[layout].extend(extension, meshes)
+                models[layout].extend(float(row[2]), meshes)
             else:
-                models[layout] = CraneModel(crane, extension)
+                models[layout] = CraneModel(crane, float(row[2]))
             model = models[layout]
         try:
             if not np.array_equal(row, model.strokes):
                 model.place(row, CranePose(*(values[k : k + 1] for values in poses)))
             if settle is None:
-                model.solve(float(mass))
+                model.solve(mass)
             else:
-                settle(model, float(mass), k)
+                settle(model, mass, k)
             result[k] = model.tip()
         except SolverError as error:
             failures[k] = error
-    return result, failures
+    return result, dict(sorted(failures.items()))
 
 
 def tips(crane: FlexibleCrane, strokes: Array, payload: Array) -> Array:
@@ -133,7 +136,7 @@ class CraneModel:
         self.crane, self.extension = crane, extension
         self._container = exu.SystemContainer()
         self.system = self._container.AddSystem()
-        meshes = beam_meshes(crane, extension)
+        (meshes,) = beam_meshes(crane, [extension])
         self.beams = {
             name: place_beam(self.system, crane.element, mesh, np.zeros(2), 0.0)
             for name, mesh in meshes.items()
@@ -146,6 +149,8 @@ class CraneModel:
         self._payload_load = self._add_weight(tip, 0.0)
         self.system.Assemble()
         self.strokes = np.full(3, np.nan)
+        self._angles: Mapping[str, float] = {}
+        self._solved: list[tuple[float, Array, Array]] = []
 
     def extend(self, extension: float, meshes: Meshes) -> None:
         """Change to stroke `extension` in m and its `meshes` of jib and extension.
@@ -171,7 +176,9 @@ class CraneModel:
         if not np.isfinite(rigid.tip).all():
             raise SolverError(f"strokes {listed(strokes)} m: the linkage cannot be assembled")
         self.strokes = strokes
-        for name, (origin, angle) in self._frames(rigid).items():
+        frames = self._frames(rigid)
+        start = self._turned({name: angle for name, (_, angle) in frames.items()})
+        for name, (origin, angle) in frames.items():
             self.beams[name].move(origin, angle)
         self.system.SetNodeParameter(self._head, "referenceCoordinates", list(rigid.rocker_head[0]))
         geometry = self.crane.geometry
@@ -182,8 +189,23 @@ class CraneModel:
             "coupler": geometry.coupler_length,
         }
         self.seat(dict.fromkeys(RODS, 0.0), dict.fromkeys(PIVOTS, np.zeros(2)))
-        self.system.AssembleInitializeSystemCoordinates()
-        self._solved: list[tuple[float, Array, Array]] = []
+        self._unload()
+        if start is not None:
+            self._start_from(*start)
+
+    def _turned(self, angles: Mapping[str, float]) -> tuple[Array, Array] | None:
+        """The last solution with every beam turned to its new angle, or None before the first."""
+        before, self._angles = self._angles, angles
+        if not self._solved:
+            return None
+        ode2, ae = self._solved[-1][1:]
+        # Exudyn numbers coordinates as nodes were added: the beams come first
+        turned, first = ode2.copy(), 0
+        for name, beam in self.beams.items():
+            last = first + beam.n_coordinates
+            turned[first:last] = beam.turned(ode2[first:last], angles[name] - before[name])
+            first = last
+        return turned, ae
 
     def seat(self, rods: Mapping[str, float], pivots: Mapping[str, Array]) -> None:
         """Put pins off their places until the model is placed anew or seated again.
@@ -203,14 +225,19 @@ class CraneModel:
         self._set_weight(self._payload_load, payload)
         self._predict(payload)
         if not solved(self.system, _SETTINGS):
-            self.system.AssembleInitializeSystemCoordinates()  # back to the unloaded pose
-            self._solved = []
-            raise SolverError(
-                f"no static equilibrium at strokes {listed(self.strokes)} m with {payload:g} kg"
-            )
+            self._unload()
+            if not solved(self.system, _SETTINGS):
+                self._unload()
+                raise SolverError(
+                    f"no static equilibrium at strokes {listed(self.strokes)} m with {payload:g} kg"
+                )
         data = self.system.systemData
         solution = np.array(data.GetODE2Coordinates()), np.array(data.GetAECoordinates())
         self._solved = [*self._solved[-1:], (payload, *solution)]
+
+    def _unload(self) -> None:
+        self.system.AssembleInitializeSystemCoordinates()
+        self._solved = []
 
     def _predict(self, payload: float) -> None:
         """Start Newton's method on the line through the last two solutions: one step fewer."""
@@ -218,7 +245,9 @@ class CraneModel:
             return
         (m0, *q0), (m1, *q1) = self._solved[0], self._solved[-1]
         step = (payload - m1) / (m1 - m0) if m1 != m0 else 0.0
-        ode2, ae = (b + step * (b - a) for a, b in zip(q0, q1, strict=True))
+        self._start_from(*(b + step * (b - a) for a, b in zip(q0, q1, strict=True)))
+
+    def _start_from(self, ode2: Array, ae: Array) -> None:
         data = self.system.systemData
         data.SetODE2Coordinates(list(ode2), configuration=exu.ConfigurationType.Initial)
         data.SetAECoordinates(list(ae), configuration=exu.ConfigurationType.Initial)
@@ -360,17 +389,12 @@ class CraneModel:
         return float(np.atleast_1d(force)[0])
 
 
-def _settings() -> exu.SimulationSettings:
-    settings = static_settings(NEWTON_TOLERANCE)
-    settings.staticSolver.minimumStepSize = SMALLEST_LOAD_STEP
-    # the Jacobian of the crane hardly changes
-    settings.staticSolver.newton.useModifiedNewton = True
-    return settings
-
-
 def listed(values: Array) -> str:
     """Numbers in parentheses, for messages."""
     return "(" + ", ".join(f"{v:.6g}" for v in values) + ")"
 
 
-_SETTINGS = _settings()
+_SETTINGS = static_settings(NEWTON_TOLERANCE)
+_SETTINGS.staticSolver.minimumStepSize = SMALLEST_LOAD_STEP
+# the Jacobian of the crane hardly changes
+_SETTINGS.staticSolver.newton.useModifiedNewton = True

@@ -70,17 +70,22 @@ class FlexibleCrane:
 Meshes = dict[str, Elements]
 
 
-def beam_meshes(crane: FlexibleCrane, extension: float, names: Sequence[str] = BEAMS) -> Meshes:
-    """Meshes of the beams `names` at stroke `extension` in m, with a node at every pin and pad."""
-    geometry, rear_pad = crane.geometry, crane.rear_pad(extension)
-    pins = {
+def beam_meshes(
+    crane: FlexibleCrane, extensions: Sequence[float], names: Sequence[str] = BEAMS
+) -> list[Meshes]:
+    """Meshes of beams `names` at strokes `extensions` in m, a node at every pin and pad."""
+    geometry = crane.geometry
+    fixed = {
         "pillar": (geometry.lift_pivot[1] + geometry.lift_cylinder_base[1],),
         "lift": (
             geometry.lift_cylinder_head[0],
             jib_cylinder_base_in_lift(geometry)[0],
             rocker_pivot_in_lift(geometry)[0],
         ),
-        "jib": (geometry.coupler_pin[0], 0.0, rear_pad),
-        "extension": (crane.structure.front_pad - rear_pad,),
     }
-    return {n: discretise(getattr(crane.structure, n), pins[n], crane.refinement) for n in names}
+    pads = [crane.rear_pad(extension) for extension in extensions]
+    pins: dict[str, list[tuple[float, ...]]] = {n: [at] * len(pads) for n, at in fixed.items()}
+    pins["jib"] = [(geometry.coupler_pin[0], 0.0, pad) for pad in pads]
+    pins["extension"] = [(crane.structure.front_pad - pad,) for pad in pads]
+    found = [discretise(getattr(crane.structure, n), pins[n], crane.refinement) for n in names]
+    return [dict(zip(names, meshes, strict=True)) for meshes in zip(*found, strict=True)]

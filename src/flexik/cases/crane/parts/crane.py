@@ -3,15 +3,11 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from flexik.cases.crane.parts.fields import QUERY_FIELDS, SAMPLE_FIELDS
 from flexik.cases.crane.section import Section
 from flexik.evaluation.errors import TIP_ERRORS
-from flexik.kinematics.manipulator import Array
 from flexik.machines.crane import Machine
 from flexik.multibody.crane.assembly import flexible_crane, read_spring_stiffness
-from flexik.multibody.crane.model import tips
 from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning.method import Columns
 
@@ -25,17 +21,6 @@ def model_inputs(section: Section) -> dict[str, Any]:
 def flexible(machine: Machine, spring: Path) -> FlexibleCrane:
     """The crane `machine` on the ground spring of the file `spring`."""
     return flexible_crane(machine, read_spring_stiffness(spring))
-
-
-def sorted_tips(crane: FlexibleCrane, strokes: Array, payload: Array) -> Array:
-    """Tips (n, 2) in m at strokes (n, 3) under payload (n,), those of one extension together.
-
-    Raises the SolverError of the first row without equilibrium.
-    """
-    order = np.lexsort((payload, *strokes.T))
-    result = np.empty((len(strokes), 2))
-    result[order] = tips(crane, strokes[order], payload[order])
-    return result
 
 
 def columns_of(machine: Machine) -> Columns:

@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from flexik.cases.crane.parts.conditions import at, at_points
-from flexik.cases.crane.parts.crane import columns_of, flexible, model_inputs, sorted_tips
+from flexik.cases.crane.parts.crane import columns_of, flexible, model_inputs
 from flexik.cases.crane.parts.fields import TARGET_FIELDS
 from flexik.cases.crane.parts.methods import (
     method_inputs,
@@ -29,6 +29,7 @@ from flexik.evaluation.errors import Judge, evaluate, fields_of, statistics, tip
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.learning.storage import Trained, TrainingRecord, load_networks
 from flexik.machines.crane import Machine
+from flexik.multibody.crane.model import tips
 from flexik.parameters.conditions import Points
 from flexik.positioning.method import Columns, Method, Settings
 from flexik.positioning.registry import Build
@@ -121,7 +122,7 @@ def prepare(
             writers[".spread.parquet"] = table(_spread(records, results[n_pieces:]), SPREAD_FIELDS)
         return writers
 
-    judge = tip_judge(functools.partial(sorted_tips, crane))
+    judge = tip_judge(functools.partial(tips, crane))
     return Work(functools.partial(_errors, judge, columns), items, finish)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from flexik.cases.crane.parts.conditions import at_points
-from flexik.cases.crane.parts.crane import columns_of, flexible, model_inputs, sorted_tips
+from flexik.cases.crane.parts.crane import columns_of, flexible, model_inputs
 from flexik.cases.crane.parts.methods import method_inputs, method_settings, trained_method
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part, Work, rows
@@ -17,6 +17,7 @@ from flexik.evaluation.errors import Judge, evaluate, tip_judge
 from flexik.evaluation.tolerance import FIELDS, tolerance_row
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.machines.crane import Machine
+from flexik.multibody.crane.model import tips
 from flexik.parameters.conditions import Points
 from flexik.positioning.method import Columns, Method
 
@@ -55,7 +56,7 @@ def prepare(
             method = given["method"].model_copy(update={"inversion": inversion})
             found = trained_method(method, given["build"], manipulator, networks[name])
             items.append((name, tolerance, found))
-    judge = tip_judge(functools.partial(sorted_tips, crane))
+    judge = tip_judge(functools.partial(tips, crane))
     function = functools.partial(_row, conditions, judge, columns_of(machine))
     return Work(function, items, rows(*FIELDS))
 
