@@ -8,14 +8,13 @@ determinant of its Jacobian keeps its sign, and it is zero at a dead point.
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flexik.errors import ParameterError
+from flexik.kinematics.constraints import Block, Equation, blocks_of, equations_of
 from flexik.kinematics.manipulator import Array
-from flexik.machines.bodies import Point
 from flexik.machines.planar import GROUND, PlanarMachine
 
 # Newton's method is quadratic: after a step this small, in m and rad, only round-off is left
@@ -25,93 +24,12 @@ NEWTON_STEPS = 12
 HALVINGS = 6
 # Rows that are solved together: they fit the cache
 CHUNK = 4096
-# About how many poses are kept to start from
-N_STARTS = 700
+# About how many poses are kept to start from, and along a drive on either side of the middle
+N_STARTS, MOST_STARTS = 700, 16
 # How far the angles of a machine file may be off, and the largest turn in one step from them, rad
 ASSEMBLY_ANGLE, ASSEMBLY_TURN = np.radians(50.0), 0.3
 # A block whose Jacobian has a condition number above this is held twice and free at once
 SINGULAR = 1e10
-
-
-@dataclass(frozen=True)
-class Equation:
-    """One or two constraints between two bodies, 0 = residual.
-
-    key : of the joint or drive in the machine file.
-    kind : `point` (the points are one, two equations), `angle` (between the bodies), `distance` (of
-        the points) or `line` (distance of the points along `direction` of the first body).
-    constant, drive : what angle or distance is, in rad or m, plus a coordinate if drive is not None.
-    """
-
-    key: str
-    kind: str
-    bodies: tuple[int, int]
-    points: tuple[Point, Point]
-    constant: float = 0.0
-    direction: float = 0.0
-    drive: int | None = None
-
-    @property
-    def n_rows(self) -> int:
-        """How many equations it is."""
-        return 2 if self.kind == "point" else 1
-
-    def evaluate(self, poses: Array, values: Array) -> tuple[Array, Array]:
-        """Residuals (n, rows), and their derivatives (n, rows, 6) by the poses of both bodies."""
-        inner, outer = (poses[:, body] for body in self.bodies)
-        derivative = np.zeros((len(poses), self.n_rows, 6))
-        wanted: Array | float = self.constant
-        if self.drive is not None:
-            wanted = wanted + values[:, self.drive]
-        if self.kind == "angle":
-            derivative[:, 0, 2], derivative[:, 0, 5] = -1.0, 1.0
-            return (outer[:, 2] - inner[:, 2] - wanted)[:, None], derivative
-        arms = [_turned(b[:, 2], p) for b, p in zip((inner, outer), self.points, strict=True)]
-        gap = outer[:, :2] - inner[:, :2] + (arms[1] - arms[0])
-        if self.kind == "point":
-            derivative[:, [0, 1], [0, 1]], derivative[:, [0, 1], [3, 4]] = -1.0, 1.0
-            derivative[:, 0, 2], derivative[:, 0, 5] = arms[0][:, 1], -arms[1][:, 1]
-            derivative[:, 1, 2], derivative[:, 1, 5] = -arms[0][:, 0], arms[1][:, 0]
-            return gap, derivative
-        turning: Array | float = 0.0
-        if self.kind == "distance":
-            along = gap / np.hypot(gap[:, 0], gap[:, 1])[:, None]
-        else:
-            along = _turned(inner[:, 2] + self.direction, (1.0, 0.0))
-            turning = _cross(along, gap)
-        derivative[:, 0, :2], derivative[:, 0, 3:5] = -along, along
-        derivative[:, 0, 2] = turning - _cross(arms[0], along)
-        derivative[:, 0, 5] = _cross(arms[1], along)
-        length = along[:, 0] * gap[:, 0] + along[:, 1] * gap[:, 1]
-        return (length - wanted)[:, None], derivative
-
-
-@dataclass(frozen=True)
-class Block:
-    """Bodies that `equations`, as many as they have coordinates, hold to the bodies before."""
-
-    bodies: tuple[int, ...]
-    equations: tuple[Equation, ...]
-
-    def system(self, poses: Array, values: Array) -> tuple[Array, Array, list[tuple[int, Array]]]:
-        """Residual (n, m), Jacobian (n, m, m), and the derivatives (n, m, 3) by earlier bodies."""
-        size, n = 3 * len(self.bodies), len(poses)
-        residual, jacobian = np.empty((n, size)), np.zeros((n, size, size))
-        earlier: list[tuple[int, Array]] = []
-        row = 0
-        for equation in self.equations:
-            rows = slice(row, row + equation.n_rows)
-            residual[:, rows], derivative = equation.evaluate(poses, values)
-            for body, part in zip(equation.bodies, np.split(derivative, 2, axis=2), strict=True):
-                if body in self.bodies:
-                    column = 3 * self.bodies.index(body)
-                    jacobian[:, rows, column : column + 3] = part
-                elif body:
-                    whole = np.zeros((n, size, 3))
-                    whole[:, rows] = part
-                    earlier.append((body, whole))
-            row = rows.stop
-        return residual, jacobian, earlier
 
 
 @dataclass(frozen=True)
@@ -144,12 +62,12 @@ class Linkage:
     @cached_property
     def equations(self) -> list[Equation]:
         """All constraints of joints and drives."""
-        return _equations(self.machine, self.names)
+        return equations_of(self.machine, self.names)
 
     @cached_property
     def blocks(self) -> list[Block]:
         """Groups of bodies in the order of solving."""
-        return _blocks(self.names, self.equations)
+        return blocks_of(self.names, self.equations)
 
     @cached_property
     def starts(self) -> tuple[Array, Array, Array]:
@@ -159,7 +77,7 @@ class Linkage:
         """
         middle = (self.lower + self.upper)[None] / 2
         values, poses = middle, self._assembled(middle)
-        half = max(1, int(N_STARTS ** (1 / len(self.lower))) // 2)
+        half = min(max(1, int(N_STARTS ** (1 / len(self.lower))) // 2), MOST_STARTS)
         for drive, step in enumerate((self.upper - self.lower) / 2 / half):
             sides = [(values, poses)]
             for sign in (-1, 1):
@@ -210,7 +128,7 @@ class Linkage:
                     right[:, row, equation.drive] += 1.0
                 row += equation.n_rows
             found[:, block.bodies] = _solved(jacobian, right).reshape(
-                len(poses), len(block.bodies), 3, -1
+                len(poses), len(block.bodies), 3, values.shape[1]
             )
         return found
 
@@ -240,7 +158,7 @@ class Linkage:
         return found
 
     def _followed(self, drive: int, poses: Array, values: Array, ahead: Array) -> Array:
-        """`follow`, where all rows differ in `drive` alone; raises ParameterError if one is lost."""
+        """`follow` as `drive` alone moves; raises ParameterError if a row is lost."""
         found = self.follow(poses, values, ahead)
         lost = np.isnan(found).any(axis=(1, 2))
         if not lost.any():
@@ -286,79 +204,10 @@ class Linkage:
                 off = np.angle(np.exp(1j * (poses[0, body, 2] - angles[body])))
                 if abs(off) > ASSEMBLY_ANGLE:
                     raise ParameterError(
-                        f"bodies.{self.names[body]}.angle: expected about its angle with all drives "
-                        f"in the middle of their limits, {poses[0, body, 2]:.3g} rad is one"
+                        f"bodies.{self.names[body]}.angle: expected about its angle with all "
+                        f"drives in the middle of their limits, {poses[0, body, 2]:.3g} rad is one"
                     )
         return poses
-
-
-def _equations(machine: PlanarMachine, names: list[str]) -> list[Equation]:
-    found = []
-
-    def add(
-        key: str, kind: str, of: tuple[str, str], *more: float, drive: int | None = None
-    ) -> None:
-        ends = [machine.located(end) for end in of]
-        bodies = names.index(ends[0].body), names.index(ends[1].body)
-        found.append(
-            Equation(key, kind, bodies, (ends[0].point, ends[1].point), *more, drive=drive)
-        )
-
-    for name, joint in machine.joints.items():
-        key = f"joints.{name}"
-        if joint.kind == "slide":
-            add(key, "line", joint.of, 0.0, joint.direction + np.pi / 2)
-        else:
-            add(key, "point", joint.of)
-        if joint.kind != "pin":
-            add(key, "angle", joint.of, joint.angle)
-    for number, (name, drive) in enumerate(machine.drives.items()):
-        key = f"drives.{name}"
-        if drive.kind == "cylinder":
-            add(key, "distance", drive.of, drive.retracted, drive=number)
-        elif drive.kind == "telescope":
-            slide = machine.joints[drive.joint]
-            direction = slide.direction if slide.kind == "slide" else 0.0
-            add(key, "line", drive.of, drive.retracted, direction, drive=number)
-        else:
-            add(key, "angle", machine.joints[drive.joint].of, drive.zero, drive=number)
-    return found
-
-
-def _blocks(names: list[str], equations: list[Equation]) -> list[Block]:
-    """Blocks in the order of solving; raises ParameterError where bodies are free or held twice."""
-    held, waiting = {0}, list(range(1, len(names)))
-    blocks: list[Block] = []
-    while waiting:
-        block = _next_block(held, waiting, equations)
-        rows = sum(equation.n_rows for equation in block.equations)
-        words = ", ".join(names[body] for body in block.bodies)
-        missing = 3 * len(block.bodies) - rows
-        if missing:
-            joints = ", ".join(dict.fromkeys(e.key for e in block.equations)) or "nothing"
-            what = (
-                f"is free in {missing} ways"
-                if missing > 0
-                else f"is held {-missing} times too often"
-            )
-            raise ParameterError(
-                f"bodies: {words}: expected as many constraints as motions; what {joints} holds {what}"
-            )
-        blocks.append(block)
-        held |= set(block.bodies)
-        waiting = [body for body in waiting if body not in held]
-    return blocks
-
-
-def _next_block(held: set[int], waiting: list[int], equations: list[Equation]) -> Block:
-    """The smallest group of `waiting` bodies that the `held` ones hold, or else all of them."""
-    for size in range(1, len(waiting) + 1):
-        for bodies in combinations(waiting, size):
-            known = held | set(bodies)
-            own = [e for e in equations if set(e.bodies) <= known and not set(e.bodies) <= held]
-            if sum(e.n_rows for e in own) >= 3 * size:
-                return Block(bodies, tuple(own))
-    return Block(tuple(waiting), tuple(own))
 
 
 def _newton(
@@ -379,7 +228,7 @@ def _newton(
     for _ in range(steps):
         some = slice(None) if len(rows) == len(poses) else rows
         residual, jacobian, _ = block.system(poses[some], values[some])
-        step = _solved(jacobian, -residual[..., None]).reshape(len(rows), -1, 3)
+        step = _solved(jacobian, -residual[..., None]).reshape(len(rows), len(bodies), 3)
         if np.isfinite(turn):
             step *= np.minimum(1.0, turn / (np.abs(step[..., 2]).max(axis=1) + 1e-300))[
                 :, None, None
@@ -395,7 +244,7 @@ def _newton(
 
 
 def _placed(angles: Array, equations: list[Equation]) -> Array:
-    """Pose (1, b, 3) of bodies at `angles` (b,), their points as near together as that lets them."""
+    """Pose (1, b, 3) of bodies at `angles` (b,), their joints as closed as that lets them."""
     poses = np.zeros((1, len(angles), 3))
     poses[0, :, 2] = angles
     matrix, right = [], []
@@ -415,19 +264,11 @@ def _placed(angles: Array, equations: list[Equation]) -> Array:
 
 def _solved(matrix: Array, right: Array) -> Array:
     try:
-        return np.linalg.solve(matrix, right)
+        return np.asarray(np.linalg.solve(matrix, right), dtype=float)
     except np.linalg.LinAlgError:  # exactly singular: any large step does
-        return np.linalg.solve(matrix + 1e-12 * np.eye(matrix.shape[-1]), right)
+        nearly = matrix + 1e-12 * np.eye(matrix.shape[-1])
+        return np.asarray(np.linalg.solve(nearly, right), dtype=float)
 
 
 def _sign(jacobian: Array) -> Array:
     return np.sign(np.linalg.det(jacobian))
-
-
-def _turned(angle: Array, point: Point) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack([c * point[0] - s * point[1], s * point[0] + c * point[1]], axis=-1)
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
