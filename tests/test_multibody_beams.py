@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, solve_bvp
 
 from flexik.errors import DataError
-from flexik.multibody.beams import Beam, Section, discretise, read_section
+from flexik.machines.sections import Section, read_section
+from flexik.multibody.beams import Beam, discretise
 from flexik.multibody.elements import ELEMENTS, place_beam
 
 LENGTH, EI, EA = 2.0, 2.1e5, 2.1e8

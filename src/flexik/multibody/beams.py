@@ -1,21 +1,15 @@
 """Beams as data, and their reduction to finite elements (NumPy only)."""
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.errors import DataError
-
-Array = NDArray[np.float64]
-
-SECTION_COLUMNS = ("x_m", "Iz_m4", "A_m2")
+from flexik.machines.sections import Array, Section
 
 # Below this distance two stations of a beam share a node: short elements are so stiff that the
 # round-off floor of the solver rises above its tolerance, m
@@ -23,15 +17,6 @@ MERGE_DISTANCE = 0.03
 
 # Gauss-Legendre points and weights on [-1, 1], a panel between two rows of a section table
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(4)
-
-
-@dataclass(frozen=True)
-class Section:
-    """Section along a beam, linear between rows and constant beyond: abscissa m, Iz m4, A m2."""
-
-    abscissa: Array
-    second_moment: Array
-    area: Array
 
 
 @dataclass(frozen=True)
@@ -102,29 +87,6 @@ class Elements:
     axial_stiffness: Array
     residual_flexibility: Array
     node_mass: Array
-
-
-def read_section(path: Path | str) -> Section:
-    """Read a section table: CSV with columns x_m, Iz_m4, A_m2, x strictly increasing.
-
-    Raises DataError if the file is missing, lacks a column, or holds a value that is no section.
-    """
-    path = Path(path)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")  # NumPy only warns of an empty file
-            table = np.genfromtxt(path, delimiter=",", names=True, dtype=float, encoding="utf-8")
-    except (OSError, ValueError, IndexError, UserWarning) as error:
-        reason = " ".join(str(error).split())
-        raise DataError(f"section table {path}: cannot be read ({reason})") from None
-    if table.dtype.names != SECTION_COLUMNS:
-        raise DataError(f"section table {path}: columns {table.dtype.names}, not {SECTION_COLUMNS}")
-    x, second_moment, area = (np.atleast_1d(table[name]) for name in SECTION_COLUMNS)
-    if len(x) < 2 or not (np.diff(x) > 0).all():
-        raise DataError(f"section table {path}: x_m must increase over at least two rows")
-    if not ((second_moment > 0).all() and (area > 0).all()):
-        raise DataError(f"section table {path}: Iz_m4 and A_m2 must be positive numbers")
-    return Section(x, second_moment, area)
 
 
 def discretise(

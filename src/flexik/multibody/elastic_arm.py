@@ -14,7 +14,8 @@ from exudyn import itemInterface as item
 
 from flexik.errors import SolverError
 from flexik.kinematics.elastic_arm import ArmGeometry
-from flexik.multibody.beams import Array, Beam, Elements, Section, discretise, nearest
+from flexik.machines.sections import Section
+from flexik.multibody.beams import Array, Beam, Elements, discretise, nearest
 from flexik.multibody.elements import PlacedBeam, hang, place_beam, solved, static_settings, weigh
 
 # Newton's residual, N and N m: the last step falls far below it, onto the round-off floor

@@ -12,7 +12,7 @@ from flexik.cases.crane.parts.measured.campaign_file import own_campaign
 from flexik.errors import DataError, ParameterError
 from flexik.kinematics.crane import check_assembly, smallest_extension
 from flexik.machines.crane import LENGTH_TOLERANCE, Machine
-from flexik.multibody.beams import read_section
+from flexik.machines.sections import read_section
 from flexik.parameters.conditions import ConditionSet, Points, RandomTargets, check_different
 from flexik.parameters.model import Count, Model, Name, NotNegative, Positive, Seed, Share
 from flexik.parameters.networks import Axis, Network, check_networks

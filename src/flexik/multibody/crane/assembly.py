@@ -6,7 +6,8 @@ from pathlib import Path
 from flexik.errors import DataError
 from flexik.files import read_json
 from flexik.machines.crane import Machine, Structure
-from flexik.multibody.beams import Beam, read_section
+from flexik.machines.sections import read_section
+from flexik.multibody.beams import Beam
 from flexik.multibody.crane.structure import CraneStructure, FlexibleCrane
 
 
