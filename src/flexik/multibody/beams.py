@@ -7,7 +7,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexik.machines.sections import Array, Section
 
@@ -29,6 +28,7 @@ class Beam:
         times a linear factor that gives the mass and its centre.
     mass_offset : distance of the centre of mass from the axis, positive to the left, m.
     n_elements : elements of equal length; pins and pads add nodes.
+    shear : E / (k G) with the shear coefficient k of the section; 0: it does not shear.
     """
 
     section: Section
@@ -39,6 +39,7 @@ class Beam:
     mass_span: tuple[float, float]
     mass_offset: float
     n_elements: int
+    shear: float = 0.0
 
     def integrals(self, abscissa: Array) -> Array:
         """From the first end to `abscissa` (n,): 1/I, x/I, x2/I, 1/A; A, Ax, Ax2 in the mass span.
@@ -77,7 +78,7 @@ class Elements:
     bending_stiffness : L / int dx/EI, N m2.
     axial_stiffness : L / int dx/EA, N.
     residual_flexibility : int (x - middle)^2 dx/EI, m/N: what an element of constant curvature
-        lacks.
+        lacks; and that of shear.
     node_mass : (m + 1,), kg, statically equivalent to the distributed mass.
     """
 
@@ -133,7 +134,7 @@ def _reduce(
     # the last of each mesh is no element
     bending, first, second, axial, area, area_x, area_xx = np.diff(sums, append=0.0)
     length, middle = np.diff(nodes, append=0.0), (nodes + np.append(nodes[1:], 0.0)) / 2
-    residual = second - 2 * middle * first + middle**2 * bending
+    residual = second - 2 * middle * first + middle**2 * bending + beam.shear * axial
     # density follows the area, times a linear factor
     total = sums[4:, ends[0] - 1]
     mass = [beam.mass, beam.mass * beam.centre_of_mass]

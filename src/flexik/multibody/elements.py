@@ -21,7 +21,7 @@ from flexik.multibody.beams import Array, Elements, nearest
 _ITEMS: dict[str, tuple[str, dict[str, Any]]] = {
     "geometrically_exact": (
         "RigidBody2D",
-        {"objectType": "BeamGeometricallyExact2D", "includeReferenceRotations": True},
+        {"objectType": "BeamGeometricallyExact2D", "includeReferenceRotations": False},
     ),
     "ancf": ("Point2DSlope1", {"objectType": "ANCFCable2D", "useReducedOrderIntegration": 1}),
 }
@@ -30,19 +30,40 @@ ELEMENTS = tuple(_ITEMS)
 
 @dataclass
 class PlacedBeam:
-    """A beam in an Exudyn system; stations (m + 1,) in m, nodes and objects as Exudyn numbers."""
+    """A beam in an Exudyn system; stations (m + 1,) in m, nodes and objects as Exudyn numbers.
+
+    places : (m + 1, 2) in m, where the nodes lie in the frame of the body, whose x is the axis if
+        not given; only geometrically exact elements may lie along other lines.
+    tilt : angle of a straight axis in that frame, rad.
+    """
 
     system: exu.MainSystem
     ancf: bool
     stations: Array
     nodes: list[int]
     objects: list[int]
+    places: Array
+    tilt: float = 0.0
     _arms: dict[int, int] = field(default_factory=dict)
     _markers: dict[int, tuple[int, float, float]] = field(default_factory=dict)
 
     def marker(self, abscissa: float, offset: float = 0.0) -> int:
         """Marker at `abscissa`, `offset` left of the axis, in m, on a rigid arm from a node."""
         k = nearest(self.stations, abscissa)
+        return self._marker(k, abscissa - self.stations[k], offset)
+
+    def marker_at(self, abscissa: float, point: Array) -> int:
+        """Marker at `point` (2,) of the body, in m, on a rigid arm from the node at `abscissa`."""
+        k = nearest(self.stations, abscissa)
+        return self._marker(k, *self._from_node(k, point))
+
+    def _from_node(self, k: int, point: Array) -> tuple[float, float]:
+        """`point` from node k, along and left of the reference direction of the node."""
+        x, y = point - self.places[k]
+        c, s = (float(f(self.tilt)) for f in (np.cos, np.sin)) if self.ancf else (1.0, 0.0)
+        return float(c * x + s * y), float(c * y - s * x)
+
+    def _marker(self, k: int, ahead: float, offset: float) -> int:
         if self.ancf:
             body = self.objects[max(k - 1, 0)]
         else:
@@ -52,13 +73,18 @@ class PlacedBeam:
                 self._arms[k] = self.system.AddObject(arm)
             body = self._arms[k]
         marker = self.system.AddMarker({"markerType": "BodyRigid", "bodyNumber": body})
-        self._put(marker, k, abscissa - self.stations[k], offset)
+        self._put(marker, k, ahead, offset)
         return marker
 
     def slide(self, marker: int, abscissa: float) -> None:
         """Put a marker at another `abscissa` in m, on the arm from its node."""
         k, _, offset = self._markers[marker]
         self._put(marker, k, abscissa - self.stations[k], offset)
+
+    def slide_to(self, marker: int, point: Array) -> None:
+        """Put a marker at another `point` (2,) of the body in m, on the arm from its node."""
+        k = self._markers[marker][0]
+        self._put(marker, k, *self._from_node(k, point))
 
     def shift(self, marker: int, by: Array) -> None:
         """Hold a marker `by` (2,) in m, ground frame, off its place; the next shift replaces it."""
@@ -90,9 +116,10 @@ class PlacedBeam:
         marker = {"markerType": "NodeCoordinate", "nodeNumber": self.nodes[node]}
         return self.system.AddMarker({**marker, "coordinate": coordinate})
 
-    def reshape(self, elements: Elements) -> None:
+    def reshape(self, elements: Elements, places: Array | None = None) -> None:
         """Take over as many other `elements`; markers stay as far from their nodes as they are."""
         self.stations = elements.stations
+        self.places = _along_x(elements.stations) if places is None else places
         length = np.diff(elements.stations)
         parameters = {
             "length": length,
@@ -110,7 +137,7 @@ class PlacedBeam:
 
     def move(self, origin: Array, angle: float) -> None:
         """Put the reference configuration at `origin` (2,) in m and `angle` in rad."""
-        references = _references(self.ancf, self.stations, origin, angle)
+        references = _references(self.ancf, self.places, origin, angle, self.tilt)
         for node, reference in zip(self.nodes, references, strict=True):
             self.system.SetNodeParameter(node, "referenceCoordinates", reference)
 
@@ -134,15 +161,22 @@ class PlacedBeam:
 
 
 def place_beam(
-    system: exu.MainSystem, element: str, elements: Elements, origin: Array, angle: float
+    system: exu.MainSystem,
+    element: str,
+    elements: Elements,
+    origin: Array,
+    angle: float,
+    places: Array | None = None,
+    tilt: float = 0.0,
 ) -> PlacedBeam:
-    """Add a straight beam whose abscissa 0 lies at `origin` (2,) in m, axis at `angle` in rad."""
+    """Add a beam whose frame lies at `origin` (2,) in m and `angle` in rad; see PlacedBeam."""
     ancf = element == "ancf"
     node_type, element_type = _ITEMS[element]
     nodes = [system.AddNode({"nodeType": node_type}) for _ in elements.stations]
     objects = [system.AddObject({**element_type, "nodeNumbers": list(p)}) for p in pairwise(nodes)]
-    beam = PlacedBeam(system, ancf, elements.stations, nodes, objects)
-    beam.reshape(elements)
+    along = _along_x(elements.stations)
+    beam = PlacedBeam(system, ancf, elements.stations, nodes, objects, along, tilt)
+    beam.reshape(elements, places)
     beam.move(origin, angle)
     return beam
 
@@ -204,9 +238,15 @@ def neighbours(coordinates: Array, payload: Array) -> NDArray[np.int64]:
     return np.lexsort((payload, rank[group]))
 
 
-def _references(ancf: bool, stations: Array, origin: Array, angle: float) -> list[list[float]]:
-    """Reference coordinates of the nodes of a straight beam."""
-    direction = np.array([np.cos(angle), np.sin(angle)])
-    orientation = list(direction) if ancf else [angle]
-    points = (origin + stations[:, None] * direction).tolist()
+def _along_x(stations: Array) -> Array:
+    return np.column_stack([stations, np.zeros(len(stations))])
+
+
+def _references(
+    ancf: bool, places: Array, origin: Array, angle: float, tilt: float
+) -> list[list[float]]:
+    """Reference coordinates of the nodes of a beam."""
+    c, s = np.cos(angle), np.sin(angle)
+    points = (origin + places @ np.array([[c, s], [-s, c]])).tolist()
+    orientation = [float(np.cos(angle + tilt)), float(np.sin(angle + tilt))] if ancf else [angle]
     return [[*point, *orientation] for point in points]
