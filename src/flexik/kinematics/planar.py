@@ -96,9 +96,9 @@ class PlanarManipulator:
     def branch(self, values: Array) -> Array:
         """Coordinates from the third on (n, k - 2); of two drives the side of the elbow (n, 1)."""
         values = np.atleast_2d(values)
-        return (
-            self._side(self.derivatives(values))[:, None] if values.shape[1] == 2 else values[:, 2:]
-        )
+        if values.shape[1] != 2:
+            return values[:, 2:]
+        return np.where(self._side(self.derivatives(values)) < 0, -1.0, 1.0)[:, None]
 
     def inverse(
         self, targets: Array, current: Array, original_targets: Array | None = None
@@ -179,9 +179,12 @@ class PlanarManipulator:
         rows = np.flatnonzero(~found.reached)
         start = self._start(targets[rows], self._sides[1], least[rows])
         found = found.but(rows, self._search(targets[rows], start, low[rows], held[rows]))
-        rows = np.flatnonzero(~found.reached)
-        for side in self._sides:
-            start = self._start(targets[rows], side)
+        beyond = np.flatnonzero(~found.reached)
+        farther = (least + self.upper[self._first]) / 2
+        for side, near in ((s, n) for n in (None, farther) for s in self._sides):
+            # either side may need less; a start farther out is for what neither reached
+            rows = beyond if near is None else np.flatnonzero(~found.reached)
+            start = self._start(targets[rows], side, None if near is None else near[rows])
             ahead = self._search(targets[rows], start, low[rows], high[rows])
             ahead = self._lowered(targets[rows], ahead, low[rows], high[rows])
             larger = ahead.values[:, self._first] >= found.values[rows, self._first]
@@ -258,20 +261,24 @@ class PlanarManipulator:
         """Solutions nearest to `preferred` (n, k), along the solutions from `values` (n, k) on."""
         span = self.upper - self.lower
         low, high = (np.tile(limit, (len(values), 1)) for limit in (self.lower, self.upper))
-        at, share = values.copy(), np.ones(len(values))
-        before = np.full(len(values), np.inf)
-        poses = self.linkage.poses(at)
+        at, share, before = values.copy(), np.ones(len(values)), np.full(len(values), np.inf)
+        poses, rows = self.linkage.poses(at), np.arange(len(values))
         for _ in range(NEAREST_STEPS):
-            tip, slope, tangents = self._moved(poses, at)
-            room, pull = ((low - at) / span, (high - at) / span), (preferred - at) / span
-            step = _step(slope * span, targets - tip, room, UNDAMPED, pull)
-            size = np.abs(step).max(axis=1)
-            if not (size > NEAREST).any():
+            if not len(rows):
                 break
-            share = np.where(size > 0.9 * before, share / 2, np.minimum(1.0, 1.2 * share))
-            before = size
-            ahead = np.clip(at + _shortened(share[:, None] * step, LONGEST_STEP) * span, low, high)
-            poses, at = self.linkage.follow(poses, at, ahead, tangents), ahead
+            here, pose = at[rows], poses[rows]
+            tip, slope, tangents = self._moved(pose, here)
+            room = (low[rows] - here) / span, (high[rows] - here) / span
+            pull = (preferred[rows] - here) / span
+            step = _step(slope * span, targets[rows] - tip, room, UNDAMPED, pull)
+            size = np.abs(step).max(axis=1)
+            grown = size > before[rows]
+            share[rows] = np.where(grown, share[rows] / 2, np.minimum(1.0, 1.2 * share[rows]))
+            before[rows] = size
+            step = _shortened(share[rows, None] * step, LONGEST_STEP)
+            ahead = np.clip(here + step * span, low[rows], high[rows])
+            poses[rows], at[rows] = self.linkage.follow(pose, here, ahead, tangents), ahead
+            rows = rows[size > NEAREST]
         found = self._search(targets, at, low, high)
         farther = _length((found.values - preferred) / span) > _length((values - preferred) / span)
         return found._replace(gap=np.where(farther, np.inf, found.gap))
@@ -356,16 +363,18 @@ def _step(
     wanted = np.zeros_like(low) if pull is None else pull
     fixed, free = np.zeros_like(low), high > low
     lift = damping * np.mean(slope**2, axis=(1, 2)) + 1e-300
-    for _ in range(low.shape[1]):
+    for _ in range(low.shape[1] + 1):
         own = slope * free[:, None]
         rest = gap - np.einsum("nik,nk->ni", slope, np.where(free, wanted, fixed))
         matrix = own @ own.transpose(0, 2, 1)
         matrix[:, [0, 1], [0, 1]] += lift[:, None]
         force = np.linalg.solve(matrix, rest[..., None])
         step = np.where(free, wanted + (own.transpose(0, 2, 1) @ force)[..., 0], fixed)
-        over = free & ((step < low) | (step > high))
-        if not over.any():
+        beyond = np.where(free, np.maximum(low - step, step - high), 0.0)
+        if not (beyond > 0).any():
             break
+        # one at a time: the others may well stay free
+        over = (beyond > 0) & (np.arange(low.shape[1]) == beyond.argmax(axis=1)[:, None])
         fixed = np.where(over, np.clip(step, low, high), fixed)
         free = free & ~over
     return np.clip(step, low, high)
