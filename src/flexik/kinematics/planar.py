@@ -25,8 +25,8 @@ ON_TARGET = 1e-10
 MOST_STEPS, LONGEST_STEP, LAST_STEP = 50, 0.2, 1e-12
 # Damping at first, and where nothing helps any more, in shares of the mean square derivative
 DAMPING, STUCK = 1e-5, 1e4
-# Steps along the solutions of a redundant machine to the nearest one, and one that ends them
-NEAREST_STEPS, NEAREST = 30, 1e-8
+# Steps along the solutions of a redundant machine to the best one, and one that ends them
+IMPROVING_STEPS, IMPROVED = 30, 1e-8
 UNDAMPED = 1e-12
 
 
@@ -163,11 +163,7 @@ class PlanarManipulator:
             rows = np.flatnonzero(~found.reached)
             start = self._start(targets[rows], side)
             found = found.but(rows, self._search(targets[rows], start, low[rows], high[rows]))
-        if current.shape[1] > 2:
-            rows = np.flatnonzero(found.reached)
-            nearer = self._slid(targets[rows], found.values[rows], current[rows])
-            found = found.but(rows, nearer)
-        return found
+        return found if current.shape[1] < 3 else self._improved(targets, found, low, high, current)
 
     def _smallest(self, targets: Array, least: Array) -> Search:
         """Search with the drive of `smallest_first` from `least` (n,) on as small as it can be."""
@@ -186,34 +182,34 @@ class PlanarManipulator:
             rows = beyond if near is None else np.flatnonzero(~found.reached)
             start = self._start(targets[rows], side, None if near is None else near[rows])
             ahead = self._search(targets[rows], start, low[rows], high[rows])
-            ahead = self._lowered(targets[rows], ahead, low[rows], high[rows])
+            ahead = self._improved(targets[rows], ahead, low[rows], high[rows])
             larger = ahead.values[:, self._first] >= found.values[rows, self._first]
             larger &= found.reached[rows]
             found = found.but(rows, ahead._replace(gap=np.where(larger, np.inf, ahead.gap)))
         return found
 
-    def _lowered(self, targets: Array, found: Search, low: Array, high: Array) -> Search:
-        """`found` with the first drive as small as it gets along the solutions, where reached.
+    def _improved(
+        self, targets: Array, found: Search, low: Array, high: Array, near: Array | None = None
+    ) -> Search:
+        """`found` as near to `near` (n, k) as the solutions lead, where reached.
 
-        A projected gradient method whose steps are those of Barzilai and Borwein: with three drives
-        a secant method for the place where the drive turns back. A step that gains nothing is cut.
+        Without `near`, with as small a first drive. A projected gradient method whose steps are
+        those of Barzilai and Borwein: with three drives a secant method for the place where the
+        solutions turn back. A step that gains nothing is cut.
         """
         rows = np.flatnonzero(found.reached)
-        span, values = self.upper - self.lower, found.values.copy()
-        first = self._first or 0
+        span, values, factor = self.upper - self.lower, found.values.copy(), np.ones(len(low))
         last, turn = np.full_like(values, np.nan), np.zeros_like(values)
-        factor = np.ones(len(values))
-        down = -np.eye(values.shape[1])[[first]]
-        for _ in range(NEAREST_STEPS):
+        for _ in range(IMPROVING_STEPS):
             if not len(rows):
                 break
-            here = values[rows]
+            here, still = values[rows], np.zeros((len(rows), 2))
             slope = self.derivatives(here) * span
             room = (low[rows] - here) / span, (high[rows] - here) / span
-            # where the solutions lead down: only drives on a limit are held
-            down_room, up_room = (np.sign(r) * (np.abs(r) > LAST_STEP) for r in room)
-            still, wish = np.zeros((len(rows), 2)), np.repeat(down, len(rows), axis=0)
-            pull = _step(slope, still, (down_room, up_room), UNDAMPED, wish)
+            worth, wish = self._worth(here, near, rows)
+            # where the solutions lead: only drives on a limit are held
+            down, up = (np.sign(r) * (np.abs(r) > LAST_STEP) for r in room)
+            pull = _step(slope, still, (down, up), UNDAMPED, wish)
             moved, turned = (here - last[rows]) / span, turn[rows] - pull
             bent = np.abs(np.sum(moved * turned, axis=1))
             fresh = bent > 0  # not at first, and not where the last step was cut
@@ -221,14 +217,20 @@ class PlanarManipulator:
             step = _shortened(factor[rows, None] * pull, LONGEST_STEP)
             step = _step(slope, still, room, UNDAMPED, step)
             tried = self._search(targets[rows], here + step * span, low[rows], high[rows])
-            gained = tried.reached & (tried.values[:, first] < here[:, first])
-            better = rows[gained]
-            last[better], turn[better] = here[gained], pull[gained]
-            values[better] = tried.values[gained]
-            last[rows[~gained]] = np.nan
-            factor[rows[~gained]] *= 0.2
-            rows = rows[np.abs(step).max(axis=1) > NEAREST]
+            gained = tried.reached & (self._worth(tried.values, near, rows)[0] < worth)
+            last[rows] = np.where(gained[:, None], here, np.nan)
+            turn[rows], factor[rows] = pull, factor[rows] * np.where(gained, 1.0, 0.2)
+            values[rows[gained]] = tried.values[gained]
+            rows = rows[np.abs(step).max(axis=1) > IMPROVED]
         return found._replace(values=values)
+
+    def _worth(self, values: Array, near: Array | None, rows: Rows) -> tuple[Array, Array]:
+        """What `_improved` lessens (n,), and the way (n, k), at most 1 long, in which it falls."""
+        if near is not None:
+            away = (near[rows] - values) / (self.upper - self.lower)
+            return _length(away), away
+        first = self._first or 0
+        return values[:, first], np.repeat(-np.eye(values.shape[1])[[first]], len(values), axis=0)
 
     def _search(self, targets: Array, start: Array, lower: Array, upper: Array) -> Search:
         """Search for `targets` (n, 2) from `start` (n, k) within bounds (n, k)."""
@@ -256,32 +258,6 @@ class PlanarManipulator:
             damping[rows] *= np.where(nearer, 0.1, 30.0)
             stuck[rows] = (damping[rows] > STUCK) | (size <= LAST_STEP)
         return Search(values, gap, stuck)
-
-    def _slid(self, targets: Array, values: Array, preferred: Array) -> Search:
-        """Solutions nearest to `preferred` (n, k), along the solutions from `values` (n, k) on."""
-        span = self.upper - self.lower
-        low, high = (np.tile(limit, (len(values), 1)) for limit in (self.lower, self.upper))
-        at, share, before = values.copy(), np.ones(len(values)), np.full(len(values), np.inf)
-        poses, rows = self.linkage.poses(at), np.arange(len(values))
-        for _ in range(NEAREST_STEPS):
-            if not len(rows):
-                break
-            here, pose = at[rows], poses[rows]
-            tip, slope, tangents = self._moved(pose, here)
-            room = (low[rows] - here) / span, (high[rows] - here) / span
-            pull = (preferred[rows] - here) / span
-            step = _step(slope * span, targets[rows] - tip, room, UNDAMPED, pull)
-            size = np.abs(step).max(axis=1)
-            grown = size > before[rows]
-            share[rows] = np.where(grown, share[rows] / 2, np.minimum(1.0, 1.2 * share[rows]))
-            before[rows] = size
-            step = _shortened(share[rows, None] * step, LONGEST_STEP)
-            ahead = np.clip(here + step * span, low[rows], high[rows])
-            poses[rows], at[rows] = self.linkage.follow(pose, here, ahead, tangents), ahead
-            rows = rows[size > NEAREST]
-        found = self._search(targets, at, low, high)
-        farther = _length((found.values - preferred) / span) > _length((values - preferred) / span)
-        return found._replace(gap=np.where(farther, np.inf, found.gap))
 
     def _status(self, targets: Array, found: Search) -> NDArray[np.int64]:
         """Codes (n,) of what a search ended on."""

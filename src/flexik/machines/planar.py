@@ -112,6 +112,12 @@ class Cylinder(_Drive):
     limits: Point
     masses: tuple[Mass, Mass] = (0.0, 0.0)
 
+    @model_validator(mode="after")
+    def _has_a_length(self) -> Self:
+        if not self.retracted + self.limits[0] > 0:
+            raise ValueError("limits.0: expected more than minus its retracted length")
+        return self
+
 
 class Telescope(_Drive):
     """Moves the outer body of the slide `joint`.
