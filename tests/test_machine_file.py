@@ -116,6 +116,13 @@ def test_a_tapered_beam_weighs_most_at_its_thick_end():
     assert centre[0] == pytest.approx(2 * (0.3 + 2 * 0.1) / 3 / (0.3 + 0.1), rel=1e-4)
 
 
+def test_masses_of_the_crane_add_up():
+    masses = general("crane").machine.masses()
+    assert sum(masses.values()) == pytest.approx(93.26 + 124.6 + 76.6 + 58.6 + 11.52 + 7.9)
+    assert general("elastic_arm").machine.masses()["bodies.link_1.masses.joint_2"] == 0.5
+    assert general("excavator").machine.masses()["drives.boom.masses.1"] == 90.0
+
+
 def test_free_constants_are_named_and_given():
     machine = general("crane").machine
     assert machine.free == ["joints.slew.springs.torsion"]
@@ -150,6 +157,7 @@ MISTAKES = [
     (CRANE, "[2.88, -0.024]", "[2880, -24]", "lift.points.jib_pivot.0: .*2880 mm would be 2.88"),
     (CRANE, "mass: 124.6", "mass: 0.1246", r"bodies.lift.mass: .*0.1246 t would be 124.6"),
     (CRANE, "mass: 124.6", "mass: -124.6", "bodies.lift.mass: .*greater than or equal to 0"),
+    (CRANE, "mass: 11.52", "mass: 0.01152", "bodies.rocker.mass: .*0.01152 t would be 11.52"),
     (CRANE, "angle_degrees: 40", "angle: 40", "bodies.lift.angle: .*40 degrees would be 0.698"),
     (CRANE, "limits: [0.0, 0.535]", "limits: [0.0, 535]", "drives.lift.limits.1: .*535 mm"),
     (CRANE, "gravity: 9.81", "gravity: 9810", "gravity: expected m/s2"),

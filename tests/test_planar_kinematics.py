@@ -151,6 +151,34 @@ def test_four_bar_closes_both_ways_as_its_angles_say():
     assert np.allclose(above[:, 3, 2], -below[::-1, 3, 2], atol=1e-12)  # the mirror image
 
 
+@settings(deadline=None, max_examples=25)
+@given(
+    crank=st.floats(0.1, 0.25),
+    coupler=st.floats(0.8, 1.2),
+    rocker=st.floats(0.7, 1.1),
+    up=st.booleans(),
+)
+def test_any_crank_and_rocker_is_two_circles(crank, coupler, rocker, up):
+    def joint(turn):
+        """The upper or the lower point of two circles about the crank's end and the ground."""
+        end = crank * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        way = np.array([1.0, 0.0]) - end
+        distance = np.hypot(*way.T)
+        ahead = (distance**2 + coupler**2 - rocker**2) / (2 * distance)
+        across = np.sqrt(coupler**2 - ahead**2) * (1 if up else -1)
+        return end, end + (ahead * way.T + across * np.stack([-way[:, 1], way[:, 0]])).T / distance[
+            :, None
+        ]
+
+    end, head = joint(np.zeros(1))
+    angles = [float(np.arctan2(*(head - foot)[0, ::-1])) for foot in (end, np.array([[1.0, 0.0]]))]
+    linkage = Linkage(four_bar(crank, coupler, rocker, angles=angles))
+    turn = np.linspace(-3.0, 3.0, 37)
+    head = joint(turn)[1] - [1.0, 0.0]
+    angle = linkage.poses(turn[:, None])[:, 3, 2]
+    assert np.abs(rocker * np.stack([np.cos(angle), np.sin(angle)], axis=1) - head).max() < 1e-11
+
+
 def test_beyond_the_dead_point_there_is_nothing():
     bars = {"crank": 0.9, "coupler": 1.0, "rocker": 0.5, "angles": (-0.4, 1.0)}
     manipulator = PlanarManipulator(four_bar(limits=(0.8, 1.5), **bars))

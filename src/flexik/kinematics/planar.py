@@ -23,11 +23,12 @@ Rows = NDArray[np.intp]
 ON_TARGET = 1e-10
 # Steps of the inverse; the longest step, and one that ends it, in shares of the ranges
 MOST_STEPS, LONGEST_STEP, LAST_STEP = 50, 0.2, 1e-12
-# Damping at first, and where nothing helps any more, in shares of the mean square derivative
-DAMPING, STUCK = 1e-5, 1e4
+# A step that leaves more than this share of the gap is slow; a search with more of them is stuck
+SLOW, SLOW_STEPS = 0.9, 4
+# Damping at first, in shares of the mean square derivative, and what is too little to matter
+DAMPING, UNDAMPED = 1e-5, 1e-12
 # Steps along the solutions of a redundant machine to the best one, and one that ends them
 IMPROVING_STEPS, IMPROVED = 30, 1e-8
-UNDAMPED = 1e-12
 
 
 class Search(NamedTuple):
@@ -239,7 +240,8 @@ class PlanarManipulator:
         poses = self.linkage.poses(values)
         tip, slope, tangents = self._moved(poses, values)
         gap = _length(targets - tip)
-        damping, stuck = np.full(len(values), DAMPING), np.zeros(len(values), dtype=bool)
+        damping, slow = np.full(len(values), DAMPING), np.zeros(len(values), dtype=int)
+        stuck = np.zeros(len(values), dtype=bool)
         for _ in range(MOST_STEPS):
             rows = np.flatnonzero((gap > ON_TARGET) & ~stuck)
             if not len(rows):
@@ -251,12 +253,14 @@ class PlanarManipulator:
             ahead = np.clip(at + _shortened(step, LONGEST_STEP) * span, low, high)
             pose = self.linkage.follow(poses[rows], at, ahead, tangents[rows])
             moved = ahead, pose, *self._moved(pose, ahead)
-            nearer = _length(targets[rows] - moved[2]) < gap[rows]
+            left = _length(targets[rows] - moved[2])
+            nearer = left < gap[rows]
+            slow[rows] += ~(left < SLOW * gap[rows])
             for mine, its in zip((values, poses, tip, slope, tangents), moved, strict=True):
                 mine[rows[nearer]] = its[nearer]
             gap[rows] = _length(targets[rows] - tip[rows])
             damping[rows] *= np.where(nearer, 0.1, 30.0)
-            stuck[rows] = (damping[rows] > STUCK) | (size <= LAST_STEP)
+            stuck[rows] = (slow[rows] > SLOW_STEPS) | (size <= LAST_STEP)
         return Search(values, gap, stuck)
 
     def _status(self, targets: Array, found: Search) -> NDArray[np.int64]:
