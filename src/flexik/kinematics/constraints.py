@@ -141,10 +141,10 @@ def blocks_of(names: list[str], equations: list[Equation]) -> list[Block]:
         missing = 3 * len(block.bodies) - rows
         if missing:
             joints = ", ".join(dict.fromkeys(e.key for e in block.equations)) or "nothing"
-            what = f"leaves {missing} free" if missing > 0 else f"holds {-missing} twice"
+            what = f"leave {missing} free" if missing > 0 else f"hold {-missing} too often"
             raise ParameterError(
                 f"bodies: {words}: expected each of {3 * len(block.bodies)} motions held once by "
-                f"joints and drives; {joints} {what}"
+                f"joints and drives, but {joints} {what}"
             )
         blocks.append(block)
         held |= set(block.bodies)

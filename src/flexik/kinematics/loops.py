@@ -183,9 +183,23 @@ class Linkage:
     def _words(self, bodies: tuple[int, ...]) -> str:
         return ", ".join(self.names[body] for body in bodies)
 
+    def _angles(self, values: Array) -> Array:
+        """Angles (b,) of the machine file, at `values` (k,); those that joints give are theirs."""
+        angles = np.array([0.0, *(body.angle for body in self.machine.bodies.values())])
+        for block in self.blocks:
+            for e in block.equations:
+                if e.kind == "angle" and len(block.bodies) == 1:
+                    turn = e.constant + (0.0 if e.drive is None else values[e.drive])
+                    inner, outer = e.bodies
+                    if outer in block.bodies:
+                        angles[outer] = angles[inner] + turn
+                    else:
+                        angles[inner] = angles[outer] - turn
+        return angles
+
     def _assembled(self, values: Array) -> Array:
         """Pose (1, b, 3) at `values` (1, k) that the angles of the machine file mean."""
-        angles = np.array([0.0, *(body.angle for body in self.machine.bodies.values())])
+        angles = self._angles(values[0])
         poses = _placed(angles, self.equations)
         for block in self.blocks:
             closed = _newton(block, poses, values, None, ASSEMBLY_TURN, 5 * NEWTON_STEPS)
@@ -201,11 +215,11 @@ class Linkage:
                     f"bodies: {words}: {joints} hold one motion twice and leave another free"
                 )
             for body in block.bodies:
-                off = np.angle(np.exp(1j * (poses[0, body, 2] - angles[body])))
-                if abs(off) > ASSEMBLY_ANGLE:
+                angle = np.angle(np.exp(1j * poses[0, body, 2]))
+                if np.cos(angle - angles[body]) < np.cos(ASSEMBLY_ANGLE):
                     raise ParameterError(
                         f"bodies.{self.names[body]}.angle: expected about its angle with all "
-                        f"drives in the middle of their limits, {poses[0, body, 2]:.3g} rad is one"
+                        f"drives in the middle of their limits, {angle:.3g} rad is one"
                     )
         return poses
 

@@ -23,11 +23,12 @@ Rows = NDArray[np.intp]
 ON_TARGET = 1e-10
 # Steps of the inverse; the longest step, and one that ends it, in shares of the ranges
 MOST_STEPS, LONGEST_STEP, LAST_STEP = 50, 0.2, 1e-12
-# Damping at first, and where nothing helps any more, in shares of the mean square derivative
-DAMPING, STUCK = 1e-5, 1e4
-# Steps along the solutions of a redundant machine to the nearest one, and one that ends them
-NEAREST_STEPS, NEAREST = 30, 1e-8
-UNDAMPED = 1e-12
+# A step that leaves more than this share of the gap is slow; a search with more of them is stuck
+SLOW, SLOW_STEPS = 0.9, 4
+# Damping at first, in shares of the mean square derivative, and what is too little to matter
+DAMPING, UNDAMPED = 1e-5, 1e-12
+# Steps along the solutions of a redundant machine to the best one, and one that ends them
+IMPROVING_STEPS, IMPROVED = 30, 1e-8
 
 
 class Search(NamedTuple):
@@ -96,9 +97,9 @@ class PlanarManipulator:
     def branch(self, values: Array) -> Array:
         """Coordinates from the third on (n, k - 2); of two drives the side of the elbow (n, 1)."""
         values = np.atleast_2d(values)
-        return (
-            self._side(self.derivatives(values))[:, None] if values.shape[1] == 2 else values[:, 2:]
-        )
+        if values.shape[1] != 2:
+            return values[:, 2:]
+        return np.where(self._side(self.derivatives(values)) < 0, -1.0, 1.0)[:, None]
 
     def inverse(
         self, targets: Array, current: Array, original_targets: Array | None = None
@@ -163,11 +164,7 @@ class PlanarManipulator:
             rows = np.flatnonzero(~found.reached)
             start = self._start(targets[rows], side)
             found = found.but(rows, self._search(targets[rows], start, low[rows], high[rows]))
-        if current.shape[1] > 2:
-            rows = np.flatnonzero(found.reached)
-            nearer = self._slid(targets[rows], found.values[rows], current[rows])
-            found = found.but(rows, nearer)
-        return found
+        return found if current.shape[1] < 3 else self._improved(targets, found, low, high, current)
 
     def _smallest(self, targets: Array, least: Array) -> Search:
         """Search with the drive of `smallest_first` from `least` (n,) on as small as it can be."""
@@ -179,38 +176,41 @@ class PlanarManipulator:
         rows = np.flatnonzero(~found.reached)
         start = self._start(targets[rows], self._sides[1], least[rows])
         found = found.but(rows, self._search(targets[rows], start, low[rows], held[rows]))
-        rows = np.flatnonzero(~found.reached)
-        for side in self._sides:
-            start = self._start(targets[rows], side)
+        beyond = np.flatnonzero(~found.reached)
+        farther = (least + self.upper[self._first]) / 2
+        for side, near in ((s, n) for n in (None, farther) for s in self._sides):
+            # either side may need less; a start farther out is for what neither reached
+            rows = beyond if near is None else np.flatnonzero(~found.reached)
+            start = self._start(targets[rows], side, None if near is None else near[rows])
             ahead = self._search(targets[rows], start, low[rows], high[rows])
-            ahead = self._lowered(targets[rows], ahead, low[rows], high[rows])
+            ahead = self._improved(targets[rows], ahead, low[rows], high[rows])
             larger = ahead.values[:, self._first] >= found.values[rows, self._first]
             larger &= found.reached[rows]
             found = found.but(rows, ahead._replace(gap=np.where(larger, np.inf, ahead.gap)))
         return found
 
-    def _lowered(self, targets: Array, found: Search, low: Array, high: Array) -> Search:
-        """`found` with the first drive as small as it gets along the solutions, where reached.
+    def _improved(
+        self, targets: Array, found: Search, low: Array, high: Array, near: Array | None = None
+    ) -> Search:
+        """`found` as near to `near` (n, k) as the solutions lead, where reached.
 
-        A projected gradient method whose steps are those of Barzilai and Borwein: with three drives
-        a secant method for the place where the drive turns back. A step that gains nothing is cut.
+        Without `near`, with as small a first drive. A projected gradient method whose steps are
+        those of Barzilai and Borwein: with three drives a secant method for the place where the
+        solutions turn back. A step that gains nothing is cut.
         """
         rows = np.flatnonzero(found.reached)
-        span, values = self.upper - self.lower, found.values.copy()
-        first = self._first or 0
+        span, values, factor = self.upper - self.lower, found.values.copy(), np.ones(len(low))
         last, turn = np.full_like(values, np.nan), np.zeros_like(values)
-        factor = np.ones(len(values))
-        down = -np.eye(values.shape[1])[[first]]
-        for _ in range(NEAREST_STEPS):
+        for _ in range(IMPROVING_STEPS):
             if not len(rows):
                 break
-            here = values[rows]
+            here, still = values[rows], np.zeros((len(rows), 2))
             slope = self.derivatives(here) * span
             room = (low[rows] - here) / span, (high[rows] - here) / span
-            # where the solutions lead down: only drives on a limit are held
-            down_room, up_room = (np.sign(r) * (np.abs(r) > LAST_STEP) for r in room)
-            still, wish = np.zeros((len(rows), 2)), np.repeat(down, len(rows), axis=0)
-            pull = _step(slope, still, (down_room, up_room), UNDAMPED, wish)
+            worth, wish = self._worth(here, near, rows)
+            # where the solutions lead: only drives on a limit are held
+            down, up = (np.sign(r) * (np.abs(r) > LAST_STEP) for r in room)
+            pull = _step(slope, still, (down, up), UNDAMPED, wish)
             moved, turned = (here - last[rows]) / span, turn[rows] - pull
             bent = np.abs(np.sum(moved * turned, axis=1))
             fresh = bent > 0  # not at first, and not where the last step was cut
@@ -218,14 +218,20 @@ class PlanarManipulator:
             step = _shortened(factor[rows, None] * pull, LONGEST_STEP)
             step = _step(slope, still, room, UNDAMPED, step)
             tried = self._search(targets[rows], here + step * span, low[rows], high[rows])
-            gained = tried.reached & (tried.values[:, first] < here[:, first])
-            better = rows[gained]
-            last[better], turn[better] = here[gained], pull[gained]
-            values[better] = tried.values[gained]
-            last[rows[~gained]] = np.nan
-            factor[rows[~gained]] *= 0.2
-            rows = rows[np.abs(step).max(axis=1) > NEAREST]
+            gained = tried.reached & (self._worth(tried.values, near, rows)[0] < worth)
+            last[rows] = np.where(gained[:, None], here, np.nan)
+            turn[rows], factor[rows] = pull, factor[rows] * np.where(gained, 1.0, 0.2)
+            values[rows[gained]] = tried.values[gained]
+            rows = rows[np.abs(step).max(axis=1) > IMPROVED]
         return found._replace(values=values)
+
+    def _worth(self, values: Array, near: Array | None, rows: Rows) -> tuple[Array, Array]:
+        """What `_improved` lessens (n,), and the way (n, k), at most 1 long, in which it falls."""
+        if near is not None:
+            away = (near[rows] - values) / (self.upper - self.lower)
+            return _length(away), away
+        first = self._first or 0
+        return values[:, first], np.repeat(-np.eye(values.shape[1])[[first]], len(values), axis=0)
 
     def _search(self, targets: Array, start: Array, lower: Array, upper: Array) -> Search:
         """Search for `targets` (n, 2) from `start` (n, k) within bounds (n, k)."""
@@ -234,7 +240,8 @@ class PlanarManipulator:
         poses = self.linkage.poses(values)
         tip, slope, tangents = self._moved(poses, values)
         gap = _length(targets - tip)
-        damping, stuck = np.full(len(values), DAMPING), np.zeros(len(values), dtype=bool)
+        damping, slow = np.full(len(values), DAMPING), np.zeros(len(values), dtype=int)
+        stuck = np.zeros(len(values), dtype=bool)
         for _ in range(MOST_STEPS):
             rows = np.flatnonzero((gap > ON_TARGET) & ~stuck)
             if not len(rows):
@@ -246,35 +253,15 @@ class PlanarManipulator:
             ahead = np.clip(at + _shortened(step, LONGEST_STEP) * span, low, high)
             pose = self.linkage.follow(poses[rows], at, ahead, tangents[rows])
             moved = ahead, pose, *self._moved(pose, ahead)
-            nearer = _length(targets[rows] - moved[2]) < gap[rows]
+            left = _length(targets[rows] - moved[2])
+            nearer = left < gap[rows]
+            slow[rows] += ~(left < SLOW * gap[rows])
             for mine, its in zip((values, poses, tip, slope, tangents), moved, strict=True):
                 mine[rows[nearer]] = its[nearer]
             gap[rows] = _length(targets[rows] - tip[rows])
             damping[rows] *= np.where(nearer, 0.1, 30.0)
-            stuck[rows] = (damping[rows] > STUCK) | (size <= LAST_STEP)
+            stuck[rows] = (slow[rows] > SLOW_STEPS) | (size <= LAST_STEP)
         return Search(values, gap, stuck)
-
-    def _slid(self, targets: Array, values: Array, preferred: Array) -> Search:
-        """Solutions nearest to `preferred` (n, k), along the solutions from `values` (n, k) on."""
-        span = self.upper - self.lower
-        low, high = (np.tile(limit, (len(values), 1)) for limit in (self.lower, self.upper))
-        at, share = values.copy(), np.ones(len(values))
-        before = np.full(len(values), np.inf)
-        poses = self.linkage.poses(at)
-        for _ in range(NEAREST_STEPS):
-            tip, slope, tangents = self._moved(poses, at)
-            room, pull = ((low - at) / span, (high - at) / span), (preferred - at) / span
-            step = _step(slope * span, targets - tip, room, UNDAMPED, pull)
-            size = np.abs(step).max(axis=1)
-            if not (size > NEAREST).any():
-                break
-            share = np.where(size > 0.9 * before, share / 2, np.minimum(1.0, 1.2 * share))
-            before = size
-            ahead = np.clip(at + _shortened(share[:, None] * step, LONGEST_STEP) * span, low, high)
-            poses, at = self.linkage.follow(poses, at, ahead, tangents), ahead
-        found = self._search(targets, at, low, high)
-        farther = _length((found.values - preferred) / span) > _length((values - preferred) / span)
-        return found._replace(gap=np.where(farther, np.inf, found.gap))
 
     def _status(self, targets: Array, found: Search) -> NDArray[np.int64]:
         """Codes (n,) of what a search ended on."""
@@ -356,16 +343,18 @@ def _step(
     wanted = np.zeros_like(low) if pull is None else pull
     fixed, free = np.zeros_like(low), high > low
     lift = damping * np.mean(slope**2, axis=(1, 2)) + 1e-300
-    for _ in range(low.shape[1]):
+    for _ in range(low.shape[1] + 1):
         own = slope * free[:, None]
         rest = gap - np.einsum("nik,nk->ni", slope, np.where(free, wanted, fixed))
         matrix = own @ own.transpose(0, 2, 1)
         matrix[:, [0, 1], [0, 1]] += lift[:, None]
         force = np.linalg.solve(matrix, rest[..., None])
         step = np.where(free, wanted + (own.transpose(0, 2, 1) @ force)[..., 0], fixed)
-        over = free & ((step < low) | (step > high))
-        if not over.any():
+        beyond = np.where(free, np.maximum(low - step, step - high), 0.0)
+        if not (beyond > 0).any():
             break
+        # one at a time: the others may well stay free
+        over = (beyond > 0) & (np.arange(low.shape[1]) == beyond.argmax(axis=1)[:, None])
         fixed = np.where(over, np.clip(step, low, high), fixed)
         free = free & ~over
     return np.clip(step, low, high)

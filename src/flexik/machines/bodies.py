@@ -61,8 +61,8 @@ class _Body(Angled):
     """What all bodies have.
 
     points : by name, in the frame of the body; each is a station of a beam, in this order.
-    angle : of its frame from the ground's x in the assembly pose; about right is enough, to tell
-        which of two ways to put a linkage together is meant.
+    angle : of its frame from the ground's x with all drives in the middle of their limits; about
+        right is enough, to tell which of two ways to put a linkage together is meant.
     masses : further masses by point, in kg.
     """
 
@@ -96,7 +96,7 @@ class Beam(_Body):
     """
 
     kind: Literal["beam"]
-    axis: Annotated[tuple[Point, ...], Field(min_length=2)]
+    axis: tuple[Point, ...]
     start: Coordinate = 0.0
     section: SectionKind
     youngs_modulus: Modulus
@@ -167,8 +167,8 @@ class Beam(_Body):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        if not (self._lengths > 0).all():
-            raise ValueError("axis: two neighbouring points are the same")
+        if len(self.axis) < 2 or not (self._lengths > 0).all():
+            raise ValueError("axis: expected two points or more, neighbours apart")
         if (self.density is None) == (self.mass is None or self.centre is None):
             raise ValueError("mass: expected mass and centre, or else density")
         if self.mass_span is not None:

@@ -38,6 +38,8 @@ GROUND = "ground"
 UNCOVERED = 0.01
 # What a beam weighs by the volume of its section, kg/m3: from foam to steel with many fittings
 DENSITIES = (100.0, 1e5)
+# A mass below this share of the machine's is most likely in tonnes
+LIGHTEST = 5e-5
 
 
 Pair = tuple[Reference, Reference]
@@ -112,6 +114,12 @@ class Cylinder(_Drive):
     limits: Point
     masses: tuple[Mass, Mass] = (0.0, 0.0)
 
+    @model_validator(mode="after")
+    def _has_a_length(self) -> Self:
+        if not self.retracted + self.limits[0] > 0:
+            raise ValueError("limits.0: expected more than minus its retracted length")
+        return self
+
 
 class Telescope(_Drive):
     """Moves the outer body of the slide `joint`.
@@ -178,6 +186,18 @@ class PlanarMachine(Angled):
     def beams(self) -> dict[str, Beam]:
         """The bodies that bend."""
         return {name: body for name, body in self.bodies.items() if isinstance(body, Beam)}
+
+    def masses(self) -> dict[str, float]:
+        """What weighs, kg by dotted key; raises DataError if a section cannot be read."""
+        found: dict[str, float] = {}
+        for name, body in self.bodies.items():
+            mass = body.weight()[0] if isinstance(body, Beam) else body.mass
+            found[f"bodies.{name}.mass"] = mass
+            found |= {f"bodies.{name}.masses.{point}": m for point, m in body.masses.items()}
+        for name, drive in self.drives.items():
+            if isinstance(drive, Cylinder):
+                found |= {f"drives.{name}.masses.{k}": m for k, m in enumerate(drive.masses)}
+        return found
 
     def located(self, reference: str) -> Located:
         """Body and point of `body.point`; raises ValueError if there is none."""
@@ -256,10 +276,21 @@ def read_machine(path: Path | str) -> PlanarMachine:
     if not re.fullmatch(NAME, stem):
         raise ParameterError(f"{path}: the file's name must be small letters, digits and _")
     machine = validated(PlanarMachine, read_yaml(path), lambda keys: (str(path), ".".join(keys)))
-    wrong = [f"{path}: {line}" for name in machine.beams for line in _wrong_sections(machine, name)]
+    wrong = [line for name in machine.beams for line in _wrong_sections(machine, name)]
+    wrong = wrong or _wrong_masses(machine)
     if wrong:
-        raise ParameterError("\n".join(wrong))
+        raise ParameterError("\n".join(f"{path}: {line}" for line in wrong))
     return machine
+
+
+def _wrong_masses(machine: PlanarMachine) -> list[str]:
+    masses = machine.masses()
+    total = sum(masses.values())
+    return [
+        f"{key}: expected kg, {mass:g} of {total:.4g} in all ({mass:g} t would be {1e3 * mass:g})"
+        for key, mass in masses.items()
+        if 0.0 < mass < LIGHTEST * total
+    ]
 
 
 def _wrong_sections(machine: PlanarMachine, name: str) -> list[str]:

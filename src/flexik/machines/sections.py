@@ -1,5 +1,6 @@
 """Sections of beams: tables in files, or closed forms whose dimensions may taper."""
 
+import re
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -79,11 +80,17 @@ Dimension = Annotated[float, Field(gt=0), plausible(1e-4, 5.0, "m", mm=1e-3)]
 Taper = Dimension | tuple[Dimension, Dimension]
 
 
+def _plain_path(path: str) -> str:
+    if not re.fullmatch(r"[\w./-]+", path):
+        raise PydanticCustomError("path", "expected a path of letters, digits and . _ - /")
+    return path
+
+
 class Table(Model):
     """A CSV of columns x_m, Iz_m4, A_m2 over the abscissa of the beam; linear between rows."""
 
     kind: Literal["table"]
-    file: Annotated[str, Field(min_length=1)]
+    file: Annotated[str, AfterValidator(_plain_path)]
 
     def along(self, start: float, end: float) -> Section:
         """Section from abscissa `start` to `end`; raises DataError as read_section does."""
