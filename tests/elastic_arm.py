@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from flexik.cases.case import load
-from flexik.cases.elastic_arm.parts.arm import flexible_arm
-from flexik.multibody.elastic_arm import equilibria
+from flexik.cases.elastic_arm.parts.arm import equilibria, flexible_arm
 
 ROOT = Path(__file__).resolve().parents[1]
 SECTION = load("elastic_arm", ROOT / "params.yaml")

@@ -11,7 +11,7 @@ from elastic_arm import ROOT
 
 from flexik.cases import case as cases
 from flexik.cases.elastic_arm import report_results
-from flexik.cases.elastic_arm.parts.arm import flexible_arm
+from flexik.cases.elastic_arm.parts.arm import equilibria, flexible_arm
 from flexik.cases.elastic_arm.parts.gauges import SHOWN
 from flexik.cases.elastic_arm.parts.kinds import KINDS, learning_data
 from flexik.cases.elastic_arm.report import report
@@ -19,7 +19,6 @@ from flexik.datasets.parallel import ParallelSettings
 from flexik.datasets.parts import make
 from flexik.datasets.tables import read_table
 from flexik.learning.storage import load_network, load_restarts
-from flexik.multibody.elastic_arm import equilibria
 from flexik.parameters.reading import overlay, read_yaml
 
 STAGES = ("generate", "select", "train", "evaluate", "study")

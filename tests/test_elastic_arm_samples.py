@@ -6,6 +6,7 @@ import pytest
 from elastic_arm import GEOMETRY, MODEL, SECTION
 
 from flexik.cases.elastic_arm.parts import gauges
+from flexik.cases.elastic_arm.parts.arm import Equilibria, equilibria
 from flexik.cases.elastic_arm.parts.gauges import noise_generator
 from flexik.cases.elastic_arm.parts.generate import parts
 from flexik.cases.elastic_arm.parts.kinds import KINDS, learning_data, learning_table
@@ -22,7 +23,6 @@ from flexik.datasets.parallel import ParallelSettings
 from flexik.datasets.parts import make
 from flexik.datasets.tables import read_table
 from flexik.kinematics.elastic_arm import DEFORMATION, elbow, flexible_forward
-from flexik.multibody.elastic_arm import Equilibria, equilibria
 
 MACHINE = SECTION.machine
 GAUGES = MACHINE.gauges

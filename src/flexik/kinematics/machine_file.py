@@ -11,7 +11,7 @@ from flexik.kinematics.elastic_arm import ArmGeometry
 from flexik.kinematics.manipulator import Array, Manipulator
 from flexik.kinematics.planar import PlanarManipulator
 from flexik.machines.crane import CraneGeometry
-from flexik.machines.planar import PlanarMachine, read_machine
+from flexik.machines.planar import PlanarMachine, faults, read_machine
 
 # The tips of a closed form and of the general solution agree this well, m, at so many poses
 TOLERANCE, N_POSES = 1e-9, 500
@@ -51,6 +51,18 @@ def manipulator_of(machine: PlanarMachine) -> Manipulator:
             f"machine's: its tips lie up to {off:.3g} m off"
         )
     return closed
+
+
+def check_machine(machine: PlanarMachine) -> None:
+    """Raise ValueError, for models of machine files, if sections, masses or bodies are wrong."""
+    wrong = faults(machine)
+    try:
+        if not wrong:
+            manipulator_of(machine)
+    except ParameterError as error:
+        wrong = [str(error)]
+    if wrong:
+        raise ValueError("; ".join(wrong))
 
 
 def crane_geometry(machine: PlanarMachine) -> CraneGeometry:

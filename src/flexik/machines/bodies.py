@@ -13,6 +13,8 @@ from flexik.parameters.model import Count, Model, Positive
 
 # Abscissas this close are the same, m
 TOLERANCE = 1e-6
+# Elements of a beam
+MOST_ELEMENTS = 500
 
 
 def _named(pattern: str, words: str) -> AfterValidator:
@@ -107,7 +109,7 @@ class Beam(_Body):
     centre: Point | None = None
     mass_span: tuple[Coordinate, Coordinate] | None = None
     density: Density | None = None
-    n_elements: Count
+    n_elements: Annotated[Count, Field(le=MOST_ELEMENTS)]
 
     @property
     def span(self) -> tuple[float, float]:

@@ -166,6 +166,7 @@ class PlanarMachine(Angled):
     ground : points of the ground by name.
     drives : in the order of the actuator coordinates.
     payload : the tip, where the payload hangs.
+    instruments : what measures the machine, if a case reads it; nothing here does.
     smallest_first : the drive whose coordinate the inverse keeps as small as it can where there is
         more than one solution; not given: the solution nearest to the current one.
     """
@@ -180,6 +181,7 @@ class PlanarMachine(Angled):
     joints: Annotated[dict[Name, Joint], Field(min_length=1)]
     drives: Annotated[dict[Name, Drive], Field(min_length=1, max_length=6)]
     payload: Reference
+    instruments: Any = None
     smallest_first: Name | None = None
 
     @property
@@ -276,11 +278,15 @@ def read_machine(path: Path | str) -> PlanarMachine:
     if not re.fullmatch(NAME, stem):
         raise ParameterError(f"{path}: the file's name must be small letters, digits and _")
     machine = validated(PlanarMachine, read_yaml(path), lambda keys: (str(path), ".".join(keys)))
-    wrong = [line for name in machine.beams for line in _wrong_sections(machine, name)]
-    wrong = wrong or _wrong_masses(machine)
-    if wrong:
+    if wrong := faults(machine):
         raise ParameterError("\n".join(f"{path}: {line}" for line in wrong))
     return machine
+
+
+def faults(machine: PlanarMachine) -> list[str]:
+    """What is wrong with sections and masses, a line a mistake that names the key."""
+    wrong = [line for name in machine.beams for line in _wrong_sections(machine, name)]
+    return wrong or _wrong_masses(machine)
 
 
 def _wrong_masses(machine: PlanarMachine) -> list[str]:

@@ -102,6 +102,20 @@ class PlacedBeam:
         turned = np.add(moved, self.system.GetNodeParameter(number, "referenceCoordinates"))[2:]
         return float(np.arctan2(turned[1], turned[0]) if self.ancf else turned[0])
 
+    def position(self, node: int) -> Array:
+        """Place (2,) of a node in the current solution, m."""
+        position = exu.OutputVariableType.Position
+        return np.array(self.system.GetNodeOutput(self.nodes[node], position)[:2])
+
+    def axial_strain(self, station: int) -> float:
+        """Axial strain of the element that begins at a station, the same all along it.
+
+        At the last station, that of the last element.
+        """
+        element = self.objects[min(station, len(self.objects) - 1)]
+        strain = exu.OutputVariableType.StrainLocal
+        return float(self.system.GetObjectOutputBody(element, strain, [0.0, 0.0, 0.0])[0])
+
     def _put(self, marker: int, node: int, ahead: float, offset: float) -> None:
         self._markers[marker] = (node, ahead, offset)
         self._set_position(marker, node, ahead, offset)
@@ -158,6 +172,26 @@ class PlacedBeam:
         """Node positions (m + 1, 2) in m of the current solution."""
         position = exu.OutputVariableType.Position
         return np.array([self.system.GetNodeOutput(n, position)[:2] for n in self.nodes])
+
+
+@dataclass
+class PlacedBody:
+    """A rigid body in an Exudyn system: its node and object."""
+
+    system: exu.MainSystem
+    node: int
+    body: int
+    n_coordinates: int = 3
+
+    def move(self, origin: Array, angle: float) -> None:
+        """Put the reference configuration at `origin` (2,) in m and `angle` in rad."""
+        self.system.SetNodeParameter(self.node, "referenceCoordinates", [*origin.tolist(), angle])
+
+    def turned(self, displacements: Array, by: float) -> Array:
+        """Displacements (3,) when the body is turned `by` rad."""
+        c, s = np.cos(by), np.sin(by)
+        x, y, rotation = displacements
+        return np.array([c * x - s * y, s * x + c * y, rotation])
 
 
 def place_beam(

@@ -5,7 +5,6 @@ their coordinates. A slide touches the inner body with one pad and the outer one
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import exudyn as exu
@@ -18,6 +17,7 @@ from flexik.machines.sections import Array
 from flexik.multibody.beams import Elements
 from flexik.multibody.elements import (
     PlacedBeam,
+    PlacedBody,
     hang,
     neighbours,
     place_beam,
@@ -39,14 +39,18 @@ Read = Callable[["PlanarModel"], Array]
 
 
 def solve(
-    machine: FlexibleMachine, values: Array, payload: Array, read: "Read | None" = None
+    machine: FlexibleMachine,
+    values: Array,
+    payload: Array,
+    read: "Read | None" = None,
+    size: int = 2,
 ) -> tuple[Array, dict[int, SolverError]]:
     """Tip (n, 2) in m at coordinates (n, k) with `payload` (n,) in kg, and the rows that failed.
 
     Rows whose meshes have the same layout share one system, each starting from a neighbour; which
     one changes a tip by less than 1e-7 m. A row without equilibrium holds NaN and is in the second
-    result, with an error that names its coordinates and payload. `read` takes something else than
-    the tip from the model of every row.
+    result, with an error that names its coordinates and payload. `read` takes something else
+    than the tip, `size` numbers, from the model of every row.
     """
     read = read or PlanarModel.tip
     values, payload = np.atleast_2d(values), np.atleast_1d(payload)
@@ -79,9 +83,9 @@ def solve(
             found[k] = read(model)
         except SolverError as error:
             failures[k] = error
-    empty = np.full(np.shape(next(iter(found.values()))) if found else (2,), np.nan)
-    rows = [found.get(k, empty) for k in range(len(values))]
-    result = np.array(rows) if rows else np.empty((0, 2))
+    result = np.full((len(values), size), np.nan)
+    for k, of_row in found.items():
+        result[k] = of_row
     return result, dict(sorted(failures.items()))
 
 
@@ -91,26 +95,6 @@ def tips(machine: FlexibleMachine, values: Array, payload: Array) -> Array:
     if failures:
         raise next(iter(failures.values()))
     return result
-
-
-@dataclass
-class PlacedBody:
-    """A rigid body in an Exudyn system: its node and object."""
-
-    system: exu.MainSystem
-    node: int
-    body: int
-    n_coordinates: int = 3
-
-    def move(self, origin: Array, angle: float) -> None:
-        """Put the reference configuration at `origin` (2,) in m and `angle` in rad."""
-        self.system.SetNodeParameter(self.node, "referenceCoordinates", [*origin.tolist(), angle])
-
-    def turned(self, displacements: Array, by: float) -> Array:
-        """Displacements (3,) when the body is turned `by` rad."""
-        c, s = np.cos(by), np.sin(by)
-        x, y, rotation = displacements
-        return np.array([c * x - s * y, s * x + c * y, rotation])
 
 
 class PlanarModel:
@@ -145,6 +129,8 @@ class PlanarModel:
         self._payload = hang(self.system, self._tip, 0.0, self.machine.gravity)
         self.system.Assemble()
         self.values = np.full(len(self.machine.drives), np.nan)
+        # in m, and more than a turn: what bends so far is an equilibrium on paper alone
+        self._longest = 2 * np.pi + sum(np.ptp(beam.span) for beam in self.machine.beams.values())
         self._angles = np.zeros(len(self.names))
         self._meshes: Mapping[str, Elements] = {}
         self._solved: list[tuple[float, Array, Array]] = []
@@ -223,6 +209,8 @@ class PlanarModel:
             return False
         data = self.system.systemData
         solution = np.array(data.GetODE2Coordinates()), np.array(data.GetAECoordinates())
+        if np.abs(solution[0]).max() > self._longest:
+            return False
         self._solved = [*self._solved[-1:], (payload, *solution)]
         return True
 

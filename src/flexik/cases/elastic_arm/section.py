@@ -6,7 +6,9 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from flexik.errors import ParameterError
+from flexik.kinematics.machine_file import arm_geometry, check_machine
 from flexik.kinematics.status import REACHED
+from flexik.machines.planar import PlanarMachine
 from flexik.parameters.conditions import RandomTargets
 from flexik.parameters.model import Interval, Model, Name, NotNegative, Positive, Seed
 from flexik.parameters.networks import Axis, check_networks
@@ -33,63 +35,29 @@ def _sloping(slope: float) -> float:
     return slope
 
 
-Pair = tuple[Positive, Positive]
 Triple = tuple[float, float, float]
 Slope = Annotated[float, AfterValidator(_sloping)]
-# From wood to diamond, Pa; and what a link of half a metre could carry, kg
-Stiffness = Annotated[float, Field(ge=1e10, le=1.2e12)]
+# What a link of half a metre could carry, kg
 Payload = Annotated[float, Field(ge=0, le=100)]
 # Below a straight angle either way
 Degrees = Annotated[float, Field(gt=-180, lt=180)]
-Limits = Annotated[tuple[Degrees, Degrees], AfterValidator(_increasing)]
 Share = Annotated[float, Field(gt=0, lt=1)]
 
 # Prefixes of metrics that are no network or method
 TAKEN_NAMES = ("readings", "select", "splits")
 
+LINKS = ("link_1", "link_2")
+STATIONS = {"deflection_station", "strain_station"}
+# Of an angle in degrees and back
+ROUND_OFF = 1e-9
 MAXIMUM_READINGS = 20_000
 # Fewest readings of a part: an R needs several
 MINIMUM_PART = 5
 
 
-class Geometry(Model):
-    """Lengths and joint limits."""
-
-    lengths: Pair
-    theta_1_degrees: Limits
-    theta_2_degrees: Limits
-
-
-class Tube(Model):
-    """Section of both links."""
-
-    width: Positive
-    height: Positive
-    wall: Positive
-
-    @model_validator(mode="after")
-    def _hollow(self) -> Self:
-        if 2 * self.wall >= min(self.width, self.height):
-            raise ValueError("wall: leaves nothing of the tube hollow")
-        return self
-
-
-class Structure(Model):
-    """What bends and weighs, see multibody.elastic_arm.FlexibleArm."""
-
-    tube: Tube
-    youngs_modulus: Stiffness
-    density: Positive
-    joint_mass: NotNegative
-    gravity: Positive
-    n_elements: Annotated[int, Field(ge=1, le=200)]
-
-
 class Gauges(Model):
     """Strain gauges, see parts/gauges.py."""
 
-    deflection_stations: Pair
-    strain_stations: Pair
     slopes: tuple[tuple[Slope, Slope, Slope], tuple[Slope, Slope, Slope]]
     intercepts: tuple[Triple, Triple]
     noise: NotNegative
@@ -99,23 +67,31 @@ class Gauges(Model):
     strain_resolution: NotNegative
 
 
-class Machine(Model):
-    """The machine file."""
+class Machine(PlanarMachine):
+    """The machine file: two links with points for gauges, and the gauges."""
 
-    geometry: Geometry
-    structure: Structure
-    gauges: Gauges
+    instruments: Gauges
 
     @model_validator(mode="after")
-    def _on_the_links(self) -> Self:
-        for name in ("deflection_stations", "strain_stations"):
-            stations = getattr(self.gauges, name)
-            for number, (station, length) in enumerate(
-                zip(stations, self.geometry.lengths, strict=True)
-            ):
-                if station >= length:
-                    raise ValueError(f"gauges.{name}.{number}: beyond its link, {length} m")
+    def _is_the_arm(self) -> Self:
+        for name in LINKS:
+            points = self.beams[name].points if name in self.beams else {}
+            if not set(points) >= STATIONS:
+                stations = ", ".join(sorted(STATIONS))
+                raise ValueError(f"bodies.{name}: expected a beam with points {stations}")
+        check_machine(self)
         return self
+
+    @property
+    def gauges(self) -> Gauges:
+        """The strain gauges."""
+        return self.instruments
+
+    @property
+    def limits_degrees(self) -> dict[str, tuple[float, float]]:
+        """Joint limits by drive."""
+        limits = {name: np.degrees(drive.limits) for name, drive in self.drives.items()}
+        return {name: (float(low), float(high)) for name, (low, high) in limits.items()}
 
 
 class DegreeAxis(Axis):
@@ -232,9 +208,10 @@ class Section(CaseSection):
 
     def _check_ranges(self) -> None:
         for name in ("theta_1_degrees", "theta_2_degrees"):
-            axis, (low, high) = getattr(self.samples, name), getattr(self.machine.geometry, name)
-            if axis.minimum < low or axis.maximum > high:
-                raise ValueError(f"samples.{name}: beyond the joint, {low} to {high}")
+            axis = getattr(self.samples, name)
+            low, high = self.machine.limits_degrees[name.removesuffix("_degrees")]
+            if axis.minimum < low - ROUND_OFF or axis.maximum > high + ROUND_OFF:
+                raise ValueError(f"samples.{name}: beyond the joint, {low:g} to {high:g}")
         least, most = min(self.samples.payloads), max(self.samples.payloads)
         for name, drawn in self.conditions.items():
             if name == "readings":
@@ -274,9 +251,7 @@ class Section(CaseSection):
 
 def check(section: Section) -> None:
     """Some of the area of random targets is reached; raises ParameterError naming the key."""
-    from flexik.cases.elastic_arm.parts.geometry import geometry_of
-
-    geometry = geometry_of(section.machine)
+    geometry = arm_geometry(section.machine)
     for name, drawn in section.conditions.items():
         x, y = np.meshgrid(np.linspace(*drawn.x, 50), np.linspace(*drawn.y, 50))
         targets = np.column_stack([x.ravel(), y.ravel()])

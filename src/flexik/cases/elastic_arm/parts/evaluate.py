@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.cases.elastic_arm.parts.arm import flexible_arm
+from flexik.cases.elastic_arm.parts.arm import FlexibleArm, equilibria, flexible_arm
 from flexik.cases.elastic_arm.parts.gauge_method import GaugeNetwork
 from flexik.cases.elastic_arm.parts.kinds import KINDS
 from flexik.cases.elastic_arm.parts.readings import FIELDS, QUERY
@@ -20,7 +20,6 @@ from flexik.datasets.tables import Field, read_table
 from flexik.evaluation.conditions import Conditions
 from flexik.evaluation.errors import TIP_ERRORS, evaluate, fields_of, tip_judge
 from flexik.kinematics.elastic_arm import DEFORMATION
-from flexik.multibody.elastic_arm import FlexibleArm, equilibria
 from flexik.positioning import registry
 from flexik.positioning.method import Array, Columns, Ingredients, Method, Settings
 

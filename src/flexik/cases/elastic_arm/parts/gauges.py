@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexik.cases.elastic_arm.parts.readings import deformation_fields
-from flexik.cases.elastic_arm.section import Machine
+from flexik.cases.elastic_arm.section import LINKS, Machine
 from flexik.datasets.tables import Field
 
 Array = NDArray[np.float64]
@@ -118,8 +118,10 @@ def _weights(slopes: Array) -> Array:
 
 def _arms(machine: Machine) -> tuple[Array, Array]:
     """Lengths (2,) of the links, and from gauge 3 to the tip (2,), m."""
-    lengths = np.array(machine.geometry.lengths)
-    return lengths, lengths - machine.gauges.deflection_stations
+    beams = [machine.beams[name] for name in LINKS]
+    lengths = np.array([beam.span[1] for beam in beams])
+    stations = [beam.foot(beam.points["deflection_station"])[0] for beam in beams]
+    return lengths, lengths - stations
 
 
 def _deformation(machine: Machine, voltages: Array, strains: Array) -> Array:

@@ -5,7 +5,13 @@ from typing import Any
 import numpy as np
 
 from flexik.cases.elastic_arm.parts import gauges
-from flexik.cases.elastic_arm.parts.arm import flexible_arm
+from flexik.cases.elastic_arm.parts.arm import (
+    Equilibria,
+    FlexibleArm,
+    equilibria,
+    flexible_arm,
+    solve,
+)
 from flexik.cases.elastic_arm.parts.readings import (
     ANGLES,
     FIELDS,
@@ -21,7 +27,6 @@ from flexik.datasets.tables import Field
 from flexik.errors import ParameterError
 from flexik.evaluation.targets import Targets, draw_candidates, reachable_targets
 from flexik.kinematics.elastic_arm import flexible_forward
-from flexik.multibody.elastic_arm import Equilibria, FlexibleArm, equilibria, solve
 from flexik.parameters.conditions import RandomTargets
 
 TARGET_FIELDS = (

@@ -9,8 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from flexik.cases.elastic_arm.parts import gauges
-from flexik.cases.elastic_arm.parts.arm import flexible_arm
-from flexik.cases.elastic_arm.parts.geometry import geometry_of
+from flexik.cases.elastic_arm.parts.arm import equilibria, flexible_arm
 from flexik.cases.elastic_arm.parts.kinds import KINDS, learning_table
 from flexik.cases.elastic_arm.parts.readings import ANGLES, HELD_OUT, TRAINING, columns_of
 from flexik.cases.elastic_arm.parts.trained import NETWORK, RESTART, Trained, restarts
@@ -19,7 +18,7 @@ from flexik.datasets.parts import Work, Writer, rows, stacked, table
 from flexik.datasets.tables import Field, read_table
 from flexik.evaluation.regression import correlation
 from flexik.kinematics.elastic_arm import DEFORMATION, flexible_forward
-from flexik.multibody.elastic_arm import equilibria
+from flexik.kinematics.machine_file import arm_geometry
 
 Array = NDArray[np.float64]
 Columns = Mapping[str, NDArray]
@@ -95,7 +94,7 @@ def _restarts(
 def _fit(machine: Machine, tables: Mapping[str, pd.DataFrame], trained: Trained) -> Columns:
     readings, shown = tables[""], tables[trained.settings.readings]
     angles = trained.network.predict(_inputs(readings, shown, trained.settings.learns))
-    tip = flexible_forward(geometry_of(machine), angles, shown[list(DEFORMATION)].to_numpy())
+    tip = flexible_forward(arm_geometry(machine), angles, shown[list(DEFORMATION)].to_numpy())
     part, right = readings["part"].to_numpy(), readings[list(ANGLES)].to_numpy()
     r = [correlation(right[part == p], angles[part == p]) for p in (TRAINING, HELD_OUT)]
     error = _tip_error(machine, angles[part == HELD_OUT], readings[part == HELD_OUT])
