@@ -293,8 +293,10 @@ def test_no_odd_value_breaks_off(tmp_path_factory, place, odd):
     inside[last] = odd
     path = tmp_path_factory.getbasetemp() / "odd.yaml"
     path.write_text(yaml.safe_dump(data, sort_keys=False))
+    told = ""
     with contextlib.chdir(ROOT):
         try:
             read_manipulator(path)
         except ParameterError as error:
-            assert all(line.startswith(f"{path}: ") for line in str(error).splitlines())
+            told = str(error)
+    assert all(line.startswith(f"{path}: ") for line in told.splitlines())
