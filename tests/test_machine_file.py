@@ -1,7 +1,11 @@
 """Machine files: what they mean, and one line that names file, key and what was expected."""
 
+import contextlib
+import copy
+
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from planar_machines import FILES, NAMES, ROOT, general
@@ -12,6 +16,7 @@ from flexik.kinematics.machine_file import read_manipulator
 from flexik.machines.bodies import Beam
 from flexik.machines.planar import PlanarMachine, read_machine
 from flexik.machines.sections import Box, Solid, Table, Tube
+from flexik.parameters.reading import read_yaml
 
 each_machine = pytest.mark.parametrize("name", NAMES)
 lengths = st.floats(0.1, 5.0)
@@ -241,3 +246,37 @@ def test_sections_in_millimetres_are_told(tmp_path, monkeypatch):
     path.write_text(text.replace("data/reference", f"{ROOT}/data/reference"))
     with pytest.raises(ParameterError, match=r"bodies.lift.section: .*are these mm4 and mm2\?"):
         read_machine(path)
+
+
+def places(data, keys=()):
+    """Keys of all that is in `data`, however deep."""
+    entries = data.items() if isinstance(data, dict) else enumerate(data)
+    for key, value in entries:
+        yield (*keys, key)
+        if isinstance(value, dict | list):
+            yield from places(value, (*keys, key))
+
+
+GIVEN = {name: read_yaml(FOLDER / f"{name}.yaml") for name in NAMES}
+PLACES = [(name, keys) for name, data in GIVEN.items() for keys in places(data)]
+ODD = [None, [], {}, "", "a.b", -1, 0, 1e9, 1e-9, True, [1, 2], [[1]], {"kind": "pin"}, "1.0"]
+
+
+@settings(deadline=None, max_examples=60)
+@given(place=st.sampled_from(PLACES), odd=st.sampled_from(ODD))
+def test_no_odd_value_breaks_off(tmp_path_factory, place, odd):
+    name, (*outer, last) = place
+    data = copy.deepcopy(GIVEN[name])
+    inside = data
+    for key in outer:
+        inside = inside[key]
+    inside[last] = odd
+    path = tmp_path_factory.getbasetemp() / "odd.yaml"
+    path.write_text(yaml.safe_dump(data, sort_keys=False))
+    told = ""
+    with contextlib.chdir(ROOT):
+        try:
+            read_manipulator(path)
+        except ParameterError as error:
+            told = str(error)
+    assert all(line.startswith(f"{path}: ") for line in told.splitlines())

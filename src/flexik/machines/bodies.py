@@ -62,7 +62,8 @@ class Angled(Model):
 class _Body(Angled):
     """What all bodies have.
 
-    points : by name, in the frame of the body; each is a station of a beam, in this order.
+    points : by name, in the frame of the body; a beam has a node near the foot of each, in this
+        order of precedence, unless the foot lies beyond its ends.
     angle : of its frame from the ground's x with all drives in the middle of their limits; about
         right is enough, to tell which of two ways to put a linkage together is meant.
     masses : further masses by point, in kg.
