@@ -36,7 +36,7 @@ def few():
 
 
 def other(**changes):
-    return MACHINE.model_copy(update={"gauges": GAUGES.model_copy(update=changes)})
+    return MACHINE.model_copy(update={"instruments": GAUGES.model_copy(update=changes)})
 
 
 def read(found, generator=None, machine=MACHINE, **options):

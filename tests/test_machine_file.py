@@ -257,7 +257,7 @@ def places(data, keys=()):
             yield from places(value, (*keys, key))
 
 
-GIVEN = {name: read_yaml(FOLDER / f"{name}.yaml") for name in NAMES}
+GIVEN = {name: read_yaml(FILES[name]) for name in NAMES}
 PLACES = [(name, keys) for name, data in GIVEN.items() for keys in places(data)]
 ODD = [None, [], {}, "", "a.b", -1, 0, 1e9, 1e-9, True, [1, 2], [[1]], {"kind": "pin"}, "1.0"]
 

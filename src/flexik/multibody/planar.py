@@ -120,10 +120,10 @@ class PlanarModel:
         self._weights = {name: self._weigh_beam(name, mesh) for name, mesh in meshes.items()}
         self.weight = sum(float(np.sum(mesh.node_mass)) for mesh in meshes.values())
         self._weigh_others()
-        self._pads: list[tuple[int, int]] = []
-        self._touched = touched
         for joint in self.machine.joints.values():
-            self._join(joint)
+            if not isinstance(joint, Slide):
+                self._join(joint)
+        self._pads = self._put_on_pads(touched)
         self.rods = self._drive()
         self._tip = self._marker(self.machine.payload)
         self._payload = hang(self.system, self._tip, 0.0, self.machine.gravity)
@@ -163,10 +163,9 @@ class PlanarModel:
         for name, body in self.bodies.items():
             x, y, angle = poses[self.names.index(name)]
             body.move(np.array([x, y]), float(angle))
-        for name, drive in self.machine.drives.items():
+        for (name, drive), value in zip(self.machine.drives.items(), values.tolist(), strict=True):
             if drive.kind == "cylinder":
-                number = list(self.machine.drives).index(name)
-                length = drive.retracted + float(values[number])
+                length = drive.retracted + value
                 self.system.SetObjectParameter(self.rods[name], "distance", length)
         self._unload()
         if start is not None:
@@ -202,10 +201,9 @@ class PlanarModel:
     def _solved_with(self, payload: float) -> bool:
         weigh(self.system, self._payload, payload, self.machine.gravity)
         self._predict(payload)
-        settings = _SETTINGS
         tolerance = TOLERANCE * self.machine.gravity * (self.weight + payload)
-        settings.staticSolver.newton.absoluteTolerance = tolerance
-        if not solved(self.system, settings):
+        _SETTINGS.staticSolver.newton.absoluteTolerance = tolerance
+        if not solved(self.system, _SETTINGS):
             return False
         data = self.system.systemData
         solution = np.array(data.GetODE2Coordinates()), np.array(data.GetAECoordinates())
@@ -303,16 +301,13 @@ class PlanarModel:
 
     def _join(self, joint: Any) -> None:
         first, second = joint.of
-        if isinstance(joint, Slide):
-            self._put_on_pads(joint)
-            return
         springs = joint.springs if isinstance(joint, Fixed) else None
         markers = [self._marker(first), self._marker(second)]
         if springs and springs.x is not None:
             spring = {"objectType": "ConnectorCartesianSpringDamper", "markerNumbers": markers}
             self.system.AddObject({**spring, "stiffness": [springs.x, springs.y, 0.0]})
         else:
-            self.system.AddObject({"objectType": "JointRevolute2D", "markerNumbers": markers})
+            self._pin(*markers)
         if springs:
             self._hold(first, second, springs.torsion)
 
@@ -324,45 +319,40 @@ class PlanarModel:
         pair = [self._rotation(first), self._rotation(second)]
         self.system.AddObject({"objectType": kind, "markerNumbers": pair, **given})
 
-    def _put_on_pads(self, slide: Slide) -> None:
-        """Two pads without friction; a telescope holds the second one where it is."""
-        number = [given for given, _, _ in self.flexible.pads].index(slide)
-        _, (inner, outer), (first, second) = self.flexible.pads[number]
-        on_outer, on_inner = self._touched[number]
-        held = any(
-            d.kind == "telescope" and self.machine.joints[d.joint] is slide
-            for d in self.machine.drives.values()
-        )
-        moving = self._at(outer, on_outer), self._at(inner, on_inner)
-        own = self._at(inner, first), self._at(outer, second)
-        angle = slide.direction - slide.angle
-        # of the line in the frame of the outer body, and across it in that of the inner one
-        axis = [float(np.cos(angle)), float(np.sin(angle)), 0.0]
-        across = [-float(np.sin(slide.direction)), float(np.cos(slide.direction)), 0.0]
-        pad = {"objectType": "JointPrismatic2D", "constrainRotation": False}
-        self.system.AddObject(
-            {
-                **pad,
-                "markerNumbers": [moving[0], own[0]],
-                "axisMarker0": axis,
-                "normalMarker1": across,
-            }
-        )
-        if held:
-            pair = [moving[1], own[1]]
-            self.system.AddObject({"objectType": "JointRevolute2D", "markerNumbers": pair})
-        else:
-            along = [across[1], -across[0], 0.0]
-            normal = [-axis[1], axis[0], 0.0]
-            self.system.AddObject(
-                {
-                    **pad,
-                    "markerNumbers": [moving[1], own[1]],
-                    "axisMarker0": along,
-                    "normalMarker1": normal,
-                }
-            )
-        self._pads.append(moving)
+    def _put_on_pads(self, touched: Array) -> list[tuple[int, int]]:
+        """Join every slide by two pads without friction; a telescope holds the second one.
+
+        Returns the markers where the pads touch at `touched`, on the outer and on the inner body.
+        """
+        telescopes = [d.joint for d in self.machine.drives.values() if d.kind == "telescope"]
+        held = [self.machine.joints[name] for name in telescopes]
+        found = []
+        for (slide, (inner, outer), (first, second)), (on_outer, on_inner) in zip(
+            self.flexible.pads, touched, strict=True
+        ):
+            moving = self._at(outer, on_outer), self._at(inner, on_inner)
+            own = self._at(inner, first), self._at(outer, second)
+            # the line of sliding in the frame of either body
+            in_inner, in_outer = slide.direction, slide.direction - slide.angle
+            self._pad(moving[0], in_outer, own[0], in_inner)
+            if any(slide is joint for joint in held):
+                self._pin(moving[1], own[1])
+            else:
+                self._pad(moving[1], in_inner, own[1], in_outer)
+            found.append(moving)
+        return found
+
+    def _pad(self, touched: int, line: float, pad: int, other_line: float) -> None:
+        """Keep marker `pad` on a line through marker `touched`, at these angles in their frames."""
+        pair = {"markerNumbers": [touched, pad], "constrainRotation": False}
+        axis = [float(np.cos(line)), float(np.sin(line)), 0.0]
+        normal = [-float(np.sin(other_line)), float(np.cos(other_line)), 0.0]
+        pad_joint = {"objectType": "JointPrismatic2D", "axisMarker0": axis, "normalMarker1": normal}
+        self.system.AddObject({**pad_joint, **pair})
+
+    def _pin(self, first: int, second: int) -> None:
+        pair = {"markerNumbers": [first, second]}
+        self.system.AddObject({"objectType": "JointRevolute2D", **pair})
 
     def _drive(self) -> dict[str, int]:
         """Hold the coordinates of all drives; returns the cylinders by name."""
