@@ -44,6 +44,8 @@ def validated(model: type[T], data: Any, source: Callable[[list[str]], tuple[str
         for detail in error.errors():
             location = _keys(detail["loc"], data, detail["type"] == "missing")
             message = _MESSAGES.get(detail["type"], detail["msg"]).removeprefix("Value error, ")
+            if detail["type"].startswith("union_tag"):
+                message = message.format(**detail["ctx"])
             if detail["type"] == "value_error":  # our own: "key within the section: what is wrong"
                 within, _, message = message.partition(": ")
                 location += within.split(".")
@@ -61,7 +63,8 @@ def validated(model: type[T], data: Any, source: Callable[[list[str]], tuple[str
 _MESSAGES = {
     "extra_forbidden": "there is no such key",
     "missing": "this key is missing",
-    "union_tag_not_found": "the key that says which kind it is is missing or names none",
+    "union_tag_not_found": "key {discriminator} is missing or names none",
+    "union_tag_invalid": "{discriminator} is '{tag}', expected one of {expected_tags}",
 }
 _OF_TYPE = ("_type", "_parsing", "_from_float")
 Mistake = tuple[list[str], bool, str]
