@@ -21,7 +21,7 @@ from flexik.multibody.beams import Array, Elements, nearest
 _ITEMS: dict[str, tuple[str, dict[str, Any]]] = {
     "geometrically_exact": (
         "RigidBody2D",
-        {"objectType": "BeamGeometricallyExact2D", "includeReferenceRotations": False},
+        {"objectType": "BeamGeometricallyExact2D", "includeReferenceRotations": True},
     ),
     "ancf": ("Point2DSlope1", {"objectType": "ANCFCable2D", "useReducedOrderIntegration": 1}),
 }
@@ -207,6 +207,9 @@ def place_beam(
     ancf = element == "ancf"
     node_type, element_type = _ITEMS[element]
     nodes = [system.AddNode({"nodeType": node_type}) for _ in elements.stations]
+    if not ancf and places is not None:
+        # nodes turn with the body, whatever the direction of an axis that may have corners
+        element_type = {**element_type, "includeReferenceRotations": False}
     objects = [system.AddObject({**element_type, "nodeNumbers": list(p)}) for p in pairwise(nodes)]
     along = _along_x(elements.stations)
     beam = PlacedBeam(system, ancf, elements.stations, nodes, objects, along, tilt)
@@ -281,6 +284,8 @@ def _references(
 ) -> list[list[float]]:
     """Reference coordinates of the nodes of a beam."""
     c, s = np.cos(angle), np.sin(angle)
-    points = (origin + places @ np.array([[c, s], [-s, c]])).tolist()
+    points = (
+        origin + places[:, :1] * np.array([c, s]) + places[:, 1:] * np.array([-s, c])
+    ).tolist()
     orientation = [float(np.cos(angle + tilt)), float(np.sin(angle + tilt))] if ancf else [angle]
     return [[*point, *orientation] for point in points]
