@@ -41,7 +41,7 @@ def cantilever(element, beam, force, offset=0.0, upright=False):
     settings = exu.SimulationSettings()
     settings.solution.file.write = False
     settings.staticSolver.verboseMode = 0
-    settings.staticSolver.newton.absoluteTolerance = 1e-6
+    settings.staticSolver.newton.absoluteTolerance = 1e-5
     assert exu.MainSolverStatic().SolveSystem(system, settings)
     return placed.shape()[-1] - start
 

@@ -27,13 +27,13 @@ from flexik.multibody.elements import (
 )
 from flexik.multibody.flexible import FlexibleMachine, feet_of, mass_offset, places_of
 
-# Newton's residual over the weight of machine and payload
+# Newton's residual over the weight of machine and payload; round-off grows with finer meshes
 TOLERANCE = 1e-6
 # Pads this close touch the same place, m
 SAME_PLACE = 1e-9
 # Share of the load below which a stubborn equilibrium is given up, and steps of the payload on the
 # way to one that is not found at once
-SMALLEST_LOAD_STEP, RAMP = 0.05, 8
+SMALLEST_LOAD_STEP, RAMP = 0.05, 40
 
 Read = Callable[["PlanarModel"], Array]
 
@@ -108,7 +108,6 @@ class PlanarModel:
     def __init__(self, flexible: FlexibleMachine, touched: Array) -> None:
         """Model with the pads at `touched` (slides, 2, 2)."""
         self.flexible, self.machine = flexible, flexible.machine
-        self.names = flexible.linkage.names
         self._container = exu.SystemContainer()
         self.system = self._container.AddSystem()
         self._ground = self.system.AddObject({"objectType": "Ground"})
@@ -118,7 +117,7 @@ class PlanarModel:
         }
         self._fixed = self._coordinate_of_ground()
         self._weights = {name: self._weigh_beam(name, mesh) for name, mesh in meshes.items()}
-        self.weight = sum(float(np.sum(mesh.node_mass)) for mesh in meshes.values())
+        self.weight = float(sum(mesh.node_mass.sum() for mesh in meshes.values()))
         self._weigh_others()
         for joint in self.machine.joints.values():
             if not isinstance(joint, Slide):
@@ -131,7 +130,7 @@ class PlanarModel:
         self.values = np.full(len(self.machine.drives), np.nan)
         # in m, and more than a turn: what bends so far is an equilibrium on paper alone
         self._longest = 2 * np.pi + sum(np.ptp(beam.span) for beam in self.machine.beams.values())
-        self._angles = np.zeros(len(self.names))
+        self._angles = np.zeros(1 + len(self.bodies))
         self._meshes: Mapping[str, Elements] = {}
         self._solved: list[tuple[float, Array, Array]] = []
 
@@ -161,7 +160,7 @@ class PlanarModel:
         self.values = values
         start = self._turned(poses[:, 2])
         for name, body in self.bodies.items():
-            x, y, angle = poses[self.names.index(name)]
+            x, y, angle = poses[self.flexible.linkage.names.index(name)]
             body.move(np.array([x, y]), float(angle))
         for (name, drive), value in zip(self.machine.drives.items(), values.tolist(), strict=True):
             if drive.kind == "cylinder":
@@ -201,7 +200,8 @@ class PlanarModel:
     def _solved_with(self, payload: float) -> bool:
         weigh(self.system, self._payload, payload, self.machine.gravity)
         self._predict(payload)
-        tolerance = TOLERANCE * self.machine.gravity * (self.weight + payload)
+        weight = self.machine.gravity * (self.weight + payload)
+        tolerance = TOLERANCE * weight * self.flexible.refinement**2
         _SETTINGS.staticSolver.newton.absoluteTolerance = tolerance
         if not solved(self.system, _SETTINGS):
             return False
