@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from fanuc_arm import ARM, FILES, section
 
-from flexik.cases.fanuc import report, report_figures, report_tables
+from flexik.cases.fanuc import report, report_figures
 from flexik.cases.fanuc.parts.evaluate import judge
 from flexik.cases.fanuc.parts.samples import taught_path
 from flexik.cases.fanuc.parts.tables import COMMANDED_FIELDS, JOINT_FIELDS, named
@@ -165,12 +165,12 @@ def but(results, **changes):
 
 
 def page(results):
-    found = report_tables.tables(results)
+    found = report.tables(results)
     return render(TEMPLATE, found, report_figures.figures(results), report.values(results)).text
 
 
 def frame(results, name):
-    return report_tables.tables(results)[name].frame
+    return report.tables(results)[name].frame
 
 
 def test_total_errors_are_shares_of_the_range(results):
@@ -181,11 +181,11 @@ def test_total_errors_are_shares_of_the_range(results):
     assert table["interpolated (%)"].tolist() == pytest.approx([0.15] * 7)
     assert table["joint"].tolist() == [1, 2, 3, 4, 5, 6, "mean"]
     # what is not published is marked, and what is stands beside; no mean of some
-    assert set(table["config1 published"]) == {report_tables.NOT_AVAILABLE}
+    assert set(table["config1 published"]) == {report.NOT_AVAILABLE}
     known = results.published.copy()
     known.loc[3, "config1"] = 4.5
     table = frame(but(results, published=known), "total_errors")
-    assert [v == report_tables.NOT_AVAILABLE for v in table["config1 published"]].count(True) == 6
+    assert [v == report.NOT_AVAILABLE for v in table["config1 published"]].count(True) == 6
     assert table["config1 published"][2] == 4.5
 
 
@@ -354,7 +354,7 @@ def test_timings_belong_to_the_settings_they_were_measured_with(change, expected
 
 def test_the_report_is_whole_and_linked(results, tmp_path):
     content = Content(
-        report_tables.tables(results),
+        report.tables(results),
         report_figures.figures(results),
         report.metrics(results),
         report.values(results),

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from flexik.cases.fanuc.parts.tables import COMMANDED_FIELDS, JOINT_FIELDS, array
-from flexik.cases.fanuc.report_results import Results, label
+from flexik.cases.fanuc.report_results import VARIED, Results, label
 from flexik.cases.fanuc.section import EXACT, LOOKED_UP, WHOLE
 from flexik.datasets.tables import Field
 from flexik.kinematics.serial_arm import frames
@@ -165,14 +165,13 @@ def _study(results: Results, varied: str) -> Drawing:
     errors = results.study_statistics(varied)
     blue, orange = {"color": style.BLUE, "marker": "o"}, {"color": style.ORANGE, "marker": "s"}
     sky, label_of_all = {"color": style.SKY}, "total error, all starts"
-    what = "hidden neurons" if varied == "n_hidden" else "learning factor"
     labels = ("total error on the test samples, median", "the same on the training samples, median")
     return draw(
         chart,
         Layer(errors, "value", "least", "band", to="largest", look=sky, label=label_of_all),
         Layer(errors, "value", "median", "o-", look=blue, label=labels[0]),
         Layer(errors, "value", "training", "s--", look=orange, label=labels[1]),
-        x=Axis(f"{what} (1)", log=True, ticks=list(errors["value"])),
+        x=Axis(f"{VARIED[varied]} (1)", log=True, ticks=list(errors["value"])),
         y=Axis("mean absolute error (% of range)", log=True),
         titles=f"joint {getattr(results.section.studies, varied).joint}",
         height=4.0,
@@ -204,7 +203,6 @@ def _off_path(results: Results, look: dict[Any, dict[str, Any]]) -> Drawing:
         looks=look,
         panel="panel",
         columns=2,
-        share="x",
         height=7.0,
     )
 

@@ -33,6 +33,8 @@ GROWTH = (
     *("n_iterations", "seconds", "mean_position_error_mm"),
     *("mean_orientation_error_deg", "success_percent"),
 )
+# Studies, and what they vary in words
+VARIED = {"n_hidden": "hidden neurons", "learning_factor": "learning factor"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,14 +141,18 @@ class Results:
     def study_statistics(self, varied: str) -> pd.DataFrame:
         """A row a value of what was varied: errors over the starts in percent, runs ended early."""
         groups = self.studies[varied].groupby("value")
-        return groups.agg(
-            starts=("restart", "size"),
-            median=("error_percent", "median"),
-            least=("error_percent", "min"),
-            largest=("error_percent", "max"),
-            training=("training_percent", "median"),
-            early=("stop_reason", lambda reasons: int((reasons != "iterations").sum())),
-        ).reset_index()
+        return (
+            groups.agg(
+                starts=("restart", "size"),
+                median=("error_percent", "median"),
+                least=("error_percent", "min"),
+                largest=("error_percent", "max"),
+                training=("training_percent", "median"),
+                early=("stop_reason", lambda reasons: int((reasons != "iterations").sum())),
+            )
+            .reset_index()
+            .astype({"value": int} if varied == "n_hidden" else {})
+        )
 
 
 def having(frame: pd.DataFrame, **chosen: Any) -> pd.DataFrame:
@@ -176,10 +182,6 @@ def read(section: Section) -> Results:
 
     parts = [part.name for part in evaluate.parts(section)]
     with_starts = [f"{where}/{n}" for where in ("path", "off_path") for n in section.path_networks]
-    studies = {
-        name: read_table(section.data / f"studies/{name}.parquet")
-        for name in type(section.studies).model_fields
-    }
     times = read_csv(BENCHMARKS / "fanuc.csv", TIMES, ("method", "settings"), ("method",))
     growth = read_csv(BENCHMARKS / "fanuc_growth.csv", GROWTH, ("n_hidden", "settings"))
     return Results(
@@ -188,7 +190,7 @@ def read(section: Section) -> Results:
         starts=of_networks("starts"),
         curves=of_networks("curves"),
         start_errors=_errors(section, with_starts, ".starts"),
-        studies=studies,
+        studies={n: read_table(section.data / f"studies/{n}.parquet") for n in VARIED},
         errors=_errors(section, parts),
         published=published(PUBLISHED),
         times=times[times["settings"] == query_settings(section)],
