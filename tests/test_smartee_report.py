@@ -8,7 +8,7 @@ import pytest
 from smartee_case import small
 from test_smartee_poses import draw, rows
 
-from flexik.cases.smartee import report_starts, report_tables
+from flexik.cases.smartee import report, report_starts
 from flexik.cases.smartee.parts.errors import COLUMNS, conditions_of, judge_of
 from flexik.cases.smartee.parts.methods import DirectKinematics
 from flexik.cases.smartee.parts.poses import POSE_FIELDS, extent_of, geometry_of, values
@@ -124,34 +124,34 @@ def page_of(results) -> str:
 
 
 def test_peaks_stand_beside_the_published_ones_in_their_units(results):
-    table = report_tables.peaks(results).set_index("error")
+    table = report.peaks(results).set_index("error")
     elbow = table.loc["elbow (mrad)"]
     assert elbow["published"] == pytest.approx(3.0)
     assert elbow["network"] == pytest.approx(np.sqrt(3.0), rel=1e-9)
     assert elbow["best mean"] == pytest.approx(0.1 * np.sqrt(3.0), rel=1e-9)
     position = results.groups["network", 0, "validation"]["position_error"].max()
     assert table.loc["position (mm)", "network"] == pytest.approx(1e3 * position)
-    found = report_tables.metrics(results)
+    found = report.metrics(results)
     assert found["network.peak_position_mm"] == pytest.approx(1e3 * position, rel=1e-3)
 
 
 def test_peaks_have_their_spread_over_the_restarts(results):
-    row = report_tables.restarts(results).set_index(["network", "error"]).loc["best", :]
+    row = report.restarts(results).set_index(["network", "error"]).loc["best", :]
     elbow = row.loc["elbow (mrad)"]
     assert elbow[["goal", "chosen", "median", "largest, random"]].tolist() == pytest.approx(
         [0.3, *(0.1 * np.sqrt(3.0) * np.array([1.0, 2.0, 3.0]))]
     )
-    found = report_tables.metrics(results)
+    found = report.metrics(results)
     assert found["network.peak_elbow_rad_median"] == pytest.approx(2e-3 * np.sqrt(3), rel=1e-3)
     assert found["network.peak_elbow_rad_largest"] == pytest.approx(3e-3 * np.sqrt(3), rel=1e-3)
 
 
 def test_verdicts_are_those_of_the_chosen_and_of_the_median_restart(results):
-    network, best = report_tables.values(results)["goals"]
+    network, best = report.values(results)["goals"]
     assert network["missed"] == {"chosen": [], "median": ["elbow"]}
     assert best["missed"] == {"chosen": [], "median": ["elbow"]}
     strict = replace(results, published={"elbow": 1e-3, "position": 1.0, "orientation": 1.0})
-    network, best = report_tables.values(strict)["goals"]
+    network, best = report.values(strict)["goals"]
     assert network["missed"]["chosen"] == best["missed"]["chosen"] == ["elbow"]
     assert network["chosen"]["elbow"] == pytest.approx(np.sqrt(3.0))
     assert (network["n_met"], network["n_restarts"]) == (0, 3)
@@ -202,7 +202,7 @@ def test_the_page_tells_what_came_out(results):
 
 
 def test_ways_to_the_elbows_have_errors_and_times(results):
-    known = report_tables.direct_kinematics(results).set_index(["start", "Newton steps"])
+    known = report.direct_kinematics(results).set_index(["start", "Newton steps"])
     assert known.loc[("network", "0"), "validation"] == f"{1e-3 * np.sqrt(3):.2e}"
     assert known.loc[("network", "2"), "single (us)"] == 120.0
     assert np.isnan(known.loc[("network", "1"), "single (us)"])
@@ -216,7 +216,7 @@ def test_ways_to_the_elbows_have_errors_and_times(results):
 
 
 def test_errors_outside_are_sorted_by_extent(results):
-    table = report_tables.outside(results)
+    table = report.outside(results)
     assert table["extent"].tolist()[0] == "0 to 1" and len(table) == 5
     # the same in every stretch, because every elbow is off by the same
     assert table["network median (mrad)"].to_numpy() == pytest.approx(np.sqrt(3.0), rel=1e-6)
@@ -232,35 +232,35 @@ def test_what_newton_finds_is_right_when_its_elbows_are(results):
         .assign(extent=0.5, status=[0, 0, 3, 5], steps=[5, 7, 50, 60], error=[1e-9, 0.2, 0.3, 3.0])
     )
     own = replace(results, errors=pd.concat([found[~beyond], crafted], ignore_index=True))
-    assert report_tables.outside(own)["Newton from the centre right (%)"][0] == 25.0
-    row = report_tables.newton(own).set_index("poses").loc["outside"]
+    assert report.outside(own)["Newton from the centre right (%)"][0] == 25.0
+    row = report.newton(own).set_index("poses").loc["outside"]
     assert (row["converged"], row["not converged"], row["other branch"]) == (2, 1, 1)
     assert (row["to wrong elbows"], row["mean steps"], row["most steps"]) == (1, 6.0, 7)
-    metrics = report_tables.metrics(own)
+    metrics = report.metrics(own)
     assert (metrics["newton.outside_n_failed"], metrics["newton.outside_n_wrong"]) == (3, 1)
-    assert report_tables.values(own)["wrong_newton"] == {"outside": 1}
+    assert report.values(own)["wrong_newton"] == {"outside": 1}
 
 
 def test_fixed_steps_that_go_wrong_are_counted(results):
-    assert report_tables.n_wrong(results, 2) == {"all": 0, "hidden": 0, "alarms": 0}
+    assert report.n_wrong(results, 2) == {"all": 0, "hidden": 0, "alarms": 0}
     table, found = results.groups["network", 2, "outside"], results.errors.copy()
     for k, (error, status) in enumerate(((0.2, 3), (0.2, 0), (1e-9, 3), (np.nan, 4))):
         found.loc[table.index[k], ["error", "status"]] = error, status
     own = replace(results, errors=found)
-    assert report_tables.n_wrong(own, 2) == {"all": 3, "hidden": 1, "alarms": 1}
-    metrics = report_tables.metrics(own)
+    assert report.n_wrong(own, 2) == {"all": 3, "hidden": 1, "alarms": 1}
+    metrics = report.metrics(own)
     assert (metrics["newton2.outside_n_failed"], metrics["newton2.outside_n_unnoticed"]) == (3, 1)
     assert np.isnan(own.peak("network", 2, "outside"))
 
 
 def test_draws_tell_how_often_the_goals_are_met(results):
-    table = report_tables.draws(results).set_index(["network", "error"])
+    table = report.draws(results).set_index(["network", "error"])
     # every elbow is off by the same, so every draw has the same peak
     assert table.loc[("network", "elbow (mrad)"), "median"] == pytest.approx(np.sqrt(3.0))
     assert table.loc[("network", "elbow (mrad)"), "meets (%)"] == 100.0
     found = results.errors.copy()
     found.loc[results.groups["network", 0, "random"].index[0], "error"] = 1.0
-    other = report_tables.draws(replace(results, errors=found))
+    other = report.draws(replace(results, errors=found))
     share = other.set_index(["network", "error"])["meets (%)"]
     # 12 draws of 12 miss one with (11 / 12)^12
     assert share["network", "elbow (mrad)"] == pytest.approx(100 * (11 / 12) ** 12, abs=4.0)
@@ -283,7 +283,7 @@ def test_success_is_counted_at_every_threshold(results):
     assert table.loc[("unpenalised_cg", "far")].tolist() == [0.0] * 2
     row = report_starts.starts(results).frame.set_index(["trainer", "start"]).loc[PAIR[1], "far"]
     assert row[["success (%)", "to success", "seconds a run"]].tolist() == [0.0, "", 0.25]
-    found = report_starts.metrics(results)
+    found = report.metrics(results)
     assert found["starts.unpenalised_cg.far.median_error"] == 4e-5
     table = report_starts.sensitivity(results)
     assert table[["tau", "success (%)"]].to_numpy().tolist() == [["0.03", 100.0], ["0.3", 0.0]]

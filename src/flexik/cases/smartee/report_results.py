@@ -28,8 +28,6 @@ LABELS = {"elbow": "elbow (mrad)", "position": "position (mm)", "orientation": "
 GOALS = {PUBLISHED: 1.0, BEST: 10.0}
 # Newton steps after a network that the sentences are about
 STEPS = 2
-# Over starts, by the word for them
-STATISTICS = {"least": "min", "median": "median", "largest": "max"}
 # What is smaller is rounding, rad
 ROUNDING = 1e-12
 

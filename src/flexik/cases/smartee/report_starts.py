@@ -6,11 +6,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from flexik.cases.smartee.report_results import STATISTICS, Results, scientific
-from flexik.cases.smartee.section import SELECTION
+from flexik.cases.smartee.report_results import Results, scientific
 from flexik.learning.starts import by_trainer
-from flexik.reporting.report import Content
-from flexik.reporting.tables import Column, Table, mm, table
+from flexik.reporting.tables import Column, Table, mm, spread, table
 
 PENALISED, UNPENALISED = "regularised_cg", "unpenalised_cg"
 # A median error this near, relatively, to that of the best linear map is at its plateau
@@ -18,32 +16,11 @@ PLATEAU = 0.1
 CAPPED = "iterations"
 
 
-def content(results: Results) -> Content:
-    """Tables, metrics and values."""
-    tables = {
-        "starts": starts(results),
-        "thresholds": Table(thresholds(results), 1),
-        "sensitivity": Table(sensitivity(results), 1),
-        "sizes": Table(sizes(results), 6),
-    }
-    return Content(tables, metrics=metrics(results), values=values(results))
-
-
-def metrics(results: Results) -> dict[str, float]:
-    """Share of success and median error of every trainer and spread, four digits."""
-    found = {}
-    for row in by_trainer(results.starts).to_dict("records"):
-        for name in ("success_share", "median_error"):
-            key = f"starts.{row['trainer']}.{row['spread']}.{name}"
-            found[key] = float(f"{row[name]:.4g}")
-    return found
-
-
 STARTS = {
     "trainer": "trainer",
     "start": "spread",
     "success (%)": Column("success_share", 1, 100.0),
-    **{f"{name} error": f"{name}_error" for name in STATISTICS},
+    **{f"{name} error": f"{name}_error" for name in ("least", "median", "largest")},
     "median elbow peak (mrad)": mm("median_judged"),
     "iterations": "iterations",
     "to success": "median_success_iteration",
@@ -51,6 +28,16 @@ STARTS = {
     "seconds a run": "seconds",
     "median error of long runs": "long_error",
 }
+
+
+def tables(results: Results) -> dict[str, Table]:
+    """Tables by name."""
+    return {
+        "starts": starts(results),
+        "thresholds": Table(thresholds(results), 1),
+        "sensitivity": Table(sensitivity(results), 1),
+        "sizes": Table(sizes(results), 6),
+    }
 
 
 def starts(results: Results) -> Table:
@@ -71,9 +58,9 @@ def starts(results: Results) -> Table:
 def thresholds(results: Results) -> pd.DataFrame:
     """Share (%) of the starts that end at or below each error, a row a trainer and spread."""
     rows = []
-    for (trainer, spread), group in results.starts.groupby(["trainer", "spread"], sort=False):
+    for (trainer, start), group in results.starts.groupby(["trainer", "spread"], sort=False):
         shares = {f"{v:g} (%)": _share(group["error"], v) for v in _limits(results)}
-        rows.append({"trainer": trainer, "start": spread, **shares})
+        rows.append({"trainer": trainer, "start": start, **shares})
     return pd.DataFrame(rows)
 
 
@@ -83,8 +70,7 @@ def sensitivity(results: Results) -> pd.DataFrame:
     for pair, group in results.sensitivity.groupby("trainer", sort=False)["error"]:
         row: dict[str, object] = dict(zip(("p", "tau"), str(pair).split(", "), strict=True))
         row["success (%)"] = _share(group, results.section.studies.starts.success)
-        for name, statistic in STATISTICS.items():
-            row[f"{name} error"] = scientific(group.agg(statistic))
+        row |= {f"{name} error": scientific(error) for name, error in spread(group).items()}
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -114,9 +100,7 @@ def values(results: Results) -> dict[str, Any]:
         "unpenalised": UNPENALISED,
         "differing": _differing(results),
         "penalty": _penalty(results),
-        "n_runs": len(results.starts),
         "all_capped": set(results.starts["stop_reason"]) == {CAPPED},
-        "linear_error": results.linear_error,
         "plateaus": [
             row
             for row in by_trainer(results.starts).to_dict("records")
@@ -130,7 +114,7 @@ def values(results: Results) -> dict[str, Any]:
         ],
         "long_ratios": _long_ratios(results),
         "other_constants": _other_constants(results),
-        "sizes": [_size(results, str(k), v) for k, v in results.sizes.groupby("poses", sort=False)],
+        "sizes": {name: _size(rows) for name, rows in results.sizes.groupby("poses", sort=False)},
     }
 
 
@@ -146,15 +130,13 @@ def _differing(results: Results) -> list[str]:
 def _penalty(results: Results) -> list[dict[str, Any]]:
     """What the penalty does from the starts of each spread, and in how many starts."""
     found = []
-    for spread in results.section.studies.starts.spreads:
-        rows = results.starts[results.starts["spread"] == spread]
-        errors = [rows.loc[rows["trainer"] == name, "error"] for name in (PENALISED, UNPENALISED)]
-        if len(errors[0]) and len(errors[1]):
-            medians = [series.median() for series in errors]
-            lower = errors[0].to_numpy() < errors[1].to_numpy()
-            shares = {limit: [_share(e, limit) for e in errors] for limit in _limits(results)}
-            both = {"ratio": medians[0] / medians[1], "n_lower": int(lower.sum())}
-            found.append({"spread": spread, "n_starts": len(lower), "shares": shares, **both})
+    for name, rows in results.starts.groupby("spread", sort=False):
+        errors = rows.pivot_table("error", "start", "trainer", dropna=False)
+        if {PENALISED, UNPENALISED} <= set(errors):
+            one, other = errors[PENALISED], errors[UNPENALISED]
+            shares = {limit: [_share(e, limit) for e in (one, other)] for limit in _limits(results)}
+            both = {"ratio": one.median() / other.median(), "n_lower": int((one < other).sum())}
+            found.append({"spread": name, "n_starts": len(errors), "shares": shares, **both})
     return found
 
 
@@ -167,12 +149,11 @@ def _long_ratios(results: Results) -> list[str]:
     """Median error of long runs from the farthest starts over that from the nearest."""
     own = results.section.studies.starts
     near, far = (choose(own.spreads, key=own.spreads.__getitem__) for choose in (min, max))
-    errors = results.training_times.set_index(["trainer", "spread"])["long_error"]
-    return [
-        f"{trainer} {errors[trainer, far] / errors[trainer, near]:.1f}"
-        for trainer in own.trainers
-        if near != far and (trainer, near) in errors and (trainer, far) in errors
-    ]
+    errors = results.training_times.pivot_table("long_error", "trainer", "spread")
+    if not {near, far} <= set(errors) or near == far:
+        return []
+    ratios = (errors[far] / errors[near]).reindex(own.trainers).dropna()
+    return [f"{trainer} {ratio:.1f}" for trainer, ratio in ratios.items()]
 
 
 def _other_constants(results: Results) -> dict[str, Any]:
@@ -195,19 +176,13 @@ def _other_constants(results: Results) -> dict[str, Any]:
     }
 
 
-def _size(results: Results, poses: str, rows: pd.DataFrame) -> dict[str, Any]:
+def _size(rows: pd.DataFrame) -> dict[str, Any]:
     """Where the selection error is least, and what it is over the training error."""
-    best = rows["n_hidden"].to_numpy()[rows["selection_error"].argmin()]
+    rows = rows.set_index("n_hidden")
+    best = rows["selection_error"].idxmin()
     ratio = rows["selection_error"] / rows["training_error"]
-    samples = results.section.samples.poses
-    return {
-        "poses": poses,
-        "n_poses": samples[poses].n_poses,
-        "best": int(best),
-        "largest": bool(best == rows["n_hidden"].max()),
-        "ratios": [ratio.min(), ratio.max()],
-        "extents": [samples[poses].extent, samples[SELECTION].extent],
-    }
+    largest = best == rows.index.max()
+    return {"best": best, "largest": largest, "ratios": [ratio.min(), ratio.max()]}
 
 
 def _share(errors: pd.Series, limit: float) -> float:
