@@ -94,12 +94,12 @@ def starts(results: Results) -> Drawing:
 
 def newton_steps(results: Results) -> Drawing:
     """Peak elbow error against Newton steps, a line for every place to start from."""
-    conditions = results.section.conditions
     lines = [(name, RANDOM, f"from {name}, random poses") for name in (CENTRE, *GOALS)]
-    for name, poses in conditions.items():
-        if poses.kind == "path":
-            label = f"from the previous of {poses.n_samples} samples of the path"
-            lines.append((PREVIOUS, name, label))
+    lines += [
+        (PREVIOUS, name, f"from the previous of {poses.n_samples} samples of the path")
+        for name, poses in results.section.conditions.items()
+        if poses.kind == "path"
+    ]
     frame = pd.DataFrame(
         {"start": label, "n_steps": n_steps, "error": results.peak(method, n_steps, name)}
         for method, name, label in lines
@@ -119,15 +119,13 @@ def outside(results: Results) -> Drawing:
     for name in GOALS:
         tables[name] = results.groups[name, 0, OUTSIDE]
         tables[f"{name} + {STEPS} steps"] = results.groups[name, STEPS, OUTSIDE]
-    largest = max(table["extent"].max() for table in tables.values())
+    rows = pd.concat(table.assign(method=name) for name, table in tables.items())
+    largest = rows["extent"].max()
     edges = np.linspace(0.0, largest, N_BINS + 1)
-    rows = []
-    for name, table in tables.items():
-        bins = np.clip(np.digitize(table["extent"], edges) - 1, 0, N_BINS - 1)
-        found = table["error"].groupby(bins).agg(["median", "max"]).reset_index(names="bin")
-        middles = 0.5 * (edges[1:] + edges[:-1])[found["bin"]]
-        rows.append(found.assign(method=name, extent=middles))
-    frame = pd.concat(rows)
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    rows["extent"] = middles[np.clip(np.digitize(rows["extent"], edges) - 1, 0, N_BINS - 1)]
+    errors = rows.groupby(["method", "extent"], sort=False)["error"]
+    frame = errors.agg(["median", "max"]).reset_index().sort_values("extent", kind="stable")
     return draw(
         chart,
         Layer(frame, "extent", "median", "-", hue="method", label="{}, median"),
