@@ -40,7 +40,7 @@ from flexik.learning.training import Architecture, train
 from flexik.positioning.arm_configurations import ArmConfigurations
 from flexik.positioning.method import Method
 from flexik.positioning.refined import Refined
-from flexik.reporting.tables import write_table
+from flexik.reporting.tables import Table
 
 OUTPUT = Path("reports/benchmarks")
 N_REPEATS, N_SINGLE, N_BATCHED = 15, 200, 2000
@@ -187,12 +187,12 @@ def main() -> None:
                 remark(1, "numpy", "py-opw-kinematics"),
             ]
             decimals = {"microseconds_single": 1, "microseconds_batched": 2}
-            write_table(OUTPUT / "fanuc", table, decimals, "Microseconds a pose.", remarks)
+            Table(table, decimals).write(OUTPUT / "fanuc", "Microseconds a pose.", remarks)
         if "growth" in chosen:
             table = grow(section, arm)
             caption = "Networks of the whole workspace, arm configuration 0; seconds of a core."
             remarks = ["One start each.", remark(1, "numpy")]
-            write_table(OUTPUT / "fanuc_growth", table, 2, caption, remarks)
+            Table(table, 2).write(OUTPUT / "fanuc_growth", caption, remarks)
 
 
 if __name__ == "__main__":

@@ -42,7 +42,7 @@ from flexik.errors import FlexikError
 from flexik.files import write_json
 from flexik.kinematics.manipulator import Array
 from flexik.multibody.crane.model import CraneModel
-from flexik.reporting.tables import markdown, write_table
+from flexik.reporting.tables import Table
 
 OUTPUT = Path("reports/benchmarks/generate")
 N_REPEATS, N_PROCESSES = 5, 2
@@ -198,11 +198,11 @@ def main() -> None:
     figures |= measure_memory(N_PROCESSES, quick)
     caption = "Generating crane samples: static equilibria a second and peak memory."
     decimals = {title: digits for title, (_, digits) in COLUMNS.items() if digits}
-    shown = table_of(figures), decimals, caption, notes(figures)
+    table, shown = Table(table_of(figures), decimals), (caption, notes(figures))
     if not quick:
-        write_table(OUTPUT, *shown)
+        table.write(OUTPUT, *shown)
         write_json(OUTPUT.with_suffix(".json"), figures)
-    print(markdown(*shown))
+    print(table.markdown(*shown))
 
 
 if __name__ == "__main__":

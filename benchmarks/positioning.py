@@ -30,7 +30,7 @@ from flexik.errors import DataError
 from flexik.evaluation.conditions import Conditions
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.positioning.method import Method
-from flexik.reporting.tables import markdown, write_table
+from flexik.reporting.tables import Table
 
 OUTPUT = Path("reports/benchmarks/positioning")
 N_REPEATS = 3
@@ -139,8 +139,8 @@ def main() -> None:
         table = pool.submit(measure).result()
     caption = "Microseconds of a positioning query, for every method."
     remarks = notes()
-    write_table(OUTPUT, table, DECIMALS, caption, remarks)
-    print(markdown(table, DECIMALS, caption, remarks))
+    Table(table, DECIMALS).write(OUTPUT, caption, remarks)
+    print(Table(table, DECIMALS).markdown(caption, remarks))
     print(f"{time.perf_counter() - started:.0f} s in all")
 
 

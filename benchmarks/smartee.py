@@ -32,7 +32,7 @@ from flexik.errors import DataError, FlexikError
 from flexik.evaluation.conditions import Conditions
 from flexik.learning.training import Architecture, train
 from flexik.positioning.method import Method
-from flexik.reporting.tables import markdown, write_table
+from flexik.reporting.tables import Table
 
 OUTPUT = Path("reports/benchmarks")
 N_SINGLE = 300
@@ -171,10 +171,10 @@ def main() -> None:
         raise FlexikError(f"usage: benchmarks/smartee.py [{' | '.join(PARTS)}], not {unknown[0]}")
     for name in chosen:
         function, file, remarks, decimals = PARTS[name]
-        table = function()
+        table = Table(function(), decimals)
         notes = [*remarks, remark(1, "numpy", "scipy")]
-        write_table(OUTPUT / file, table, decimals, f"SmartEE: {name}.", notes)
-        print(markdown(table, decimals, f"SmartEE: {name}.", notes))
+        table.write(OUTPUT / file, f"SmartEE: {name}.", notes)
+        print(table.markdown(f"SmartEE: {name}.", notes))
 
 
 if __name__ == "__main__":

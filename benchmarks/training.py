@@ -51,7 +51,7 @@ from training_race import (
 
 from flexik import stage
 from flexik.files import write_json
-from flexik.reporting.tables import markdown, write_table
+from flexik.reporting.tables import Table
 
 OUTPUT = Path("reports/benchmarks/training")
 N_PROCESSES = 2
@@ -222,19 +222,19 @@ def main() -> None:
         results = [(race, future.result()) for race, future in zip(races, futures, strict=True)]
     figures |= figures_of(results)
     figures |= {"load_end": os.getloadavg()[0], "total_seconds": time.perf_counter() - started}
-    tables = race_table(results), cost_table(figures, samples)
+    race = Table(race_table(results), DECIMALS)
+    cost = Table(cost_table(figures, samples), COST_DECIMALS)
     captions = (
         "Training the crane's networks: seconds to two errors, from equal starts.",
         "A step of the accelerated trainer: cost by size and samples.",
     )
     remarks = notes(figures, results, samples)
     if not quick:
-        write_table(OUTPUT, tables[0], DECIMALS, captions[0], remarks)
-        cost = OUTPUT.with_name(f"{OUTPUT.name}_cost")
-        write_table(cost, tables[1], COST_DECIMALS, captions[1], [_remark_on_machine()])
+        race.write(OUTPUT, captions[0], remarks)
+        cost.write(OUTPUT.with_name(f"{OUTPUT.name}_cost"), captions[1], [_remark_on_machine()])
         write_json(OUTPUT.with_suffix(".json"), figures)
-    print(markdown(tables[0], DECIMALS, captions[0], remarks))
-    print(markdown(tables[1], COST_DECIMALS, captions[1]))
+    print(race.markdown(captions[0], remarks))
+    print(cost.markdown(captions[1]))
     print(f"{figures['total_seconds']:.0f} s in all")
 
 

@@ -41,7 +41,7 @@ from flexik.parameters.trainers import (
     LevenbergMarquardtAccelerated,
     Stopping,
 )
-from flexik.reporting.tables import markdown
+from flexik.reporting.tables import Table
 
 Array = NDArray[np.float64]
 
@@ -225,7 +225,7 @@ def main() -> None:
         curves = [future.result() for future in futures]
     remarks = notes(curves, rates)
     caption = f"Training the {NETWORK} network with {N_HIDDEN} hidden neurons: error against time."
-    text = markdown(table(curves), DECIMALS, caption, remarks)
+    text = Table(table(curves), DECIMALS).markdown(caption, remarks)
     # one line for each trainer: a figure that joins two starts would mean nothing
     thinned = pd.concat([curve.thinned(N_ROWS) for curve in curves if curve.start == STARTS[0]])
     rows = thinned.to_csv(index=False, float_format="%.6g", lineterminator="\n")

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flexik.errors import DataError
-from flexik.reporting.tables import Column, markdown, mm, table, write_table
+from flexik.reporting.tables import Column, Table, mm, table
 
 
 def test_markdown_of_numbers_texts_and_nothing():
@@ -18,7 +18,7 @@ def test_markdown_of_numbers_texts_and_nothing():
             "n": pd.Series([3, None], dtype=object),
         }
     )
-    assert markdown(frame, 1, "A caption.", ["first", "second"]) == (
+    assert Table(frame, 1).markdown("A caption.", ["first", "second"]) == (
         "A caption.\n"
         "\n"
         "| max \\|dX\\| | R (mm) |   n |\n"
@@ -33,7 +33,7 @@ def test_markdown_of_numbers_texts_and_nothing():
 
 def test_csv_keeps_three_decimals_more_and_the_integers(tmp_path):
     frame = pd.DataFrame({"name": ["a, b"], "x": [np.pi], "y": [-1e-9], "n": [np.int64(7)]})
-    write_table(tmp_path / "out" / "table.v1", frame, {"x": 0})
+    Table(frame, {"x": 0}).write(tmp_path / "out" / "table.v1")
     csv = (tmp_path / "out" / "table.v1.csv").read_bytes()
     assert csv == b'name,x,y,n\n"a, b",3.142,0.00000,7\n'
     text = (tmp_path / "out" / "table.v1.md").read_text()
@@ -43,7 +43,7 @@ def test_csv_keeps_three_decimals_more_and_the_integers(tmp_path):
 def test_round_off_does_not_change_the_files(tmp_path):
     frame = pd.DataFrame({"x": [1.0, 2 / 3, 0.0], "y": [10.0, -20.0, 1e-17]})
     for name, noise in (("a", 0.0), ("b", 1e-13)):
-        write_table(tmp_path / name, frame + noise)
+        Table(frame + noise).write(tmp_path / name)
     for suffix in (".csv", ".md"):
         first, second = ((tmp_path / name).with_suffix(suffix).read_bytes() for name in "ab")
         assert first == second
@@ -52,9 +52,9 @@ def test_round_off_does_not_change_the_files(tmp_path):
 def test_nothing_is_written_if_a_number_is_infinite(tmp_path):
     frame = pd.DataFrame({"x": [1.0, np.inf]})
     with pytest.raises(DataError, match="column x"):
-        write_table(tmp_path / "table", frame)
+        Table(frame).write(tmp_path / "table")
     with pytest.raises(DataError, match="'z'"):
-        write_table(tmp_path / "table", frame[:1], {"z": 2})
+        Table(frame[:1], {"z": 2}).write(tmp_path / "table")
     assert not list(tmp_path.iterdir())
 
 
@@ -70,7 +70,7 @@ def test_every_row_of_markdown_has_the_same_cells(values, names):
             "value": pd.Series(values + [None] * (rows - len(values)), dtype=object),
         }
     )
-    lines = markdown(frame).removesuffix("\n").split("\n")
+    lines = Table(frame).markdown().removesuffix("\n").split("\n")
     assert len(lines) == rows + 2
     assert {line.replace(r"\|", "").count("|") for line in lines} == {3}
     assert {len(line) for line in lines} == {len(lines[0])}

@@ -13,7 +13,7 @@ import pandas as pd
 
 from flexik.errors import DataError
 from flexik.files import read_json, write_text
-from flexik.reporting.tables import markdown
+from flexik.reporting.tables import Table
 
 REPORTS, REFERENCE = Path("reports"), Path("data/reference")
 CASES = Path(__file__).parents[1] / "cases"
@@ -48,15 +48,10 @@ def overview() -> str:
         for entry in entries:
             found = [v for name, v in metrics.items() if fnmatch(name, entry["metric"])]
             value = _number(sum(found) / len(found), entry) if found else ABSENT
-            rows.append(
-                {
-                    "case": entry["case"],
-                    "what": entry["what"],
-                    "published": _published(file.parent.name, entry["published"]),
-                    "flexik": value + (_spread(metrics, entry) if found else ""),
-                }
-            )
-    return markdown(pd.DataFrame(rows))
+            published = _published(file.parent.name, entry["published"])
+            value += _spread(metrics, entry) if found else ""
+            rows.append((entry["case"], entry["what"], published, value))
+    return Table(pd.DataFrame(rows, columns=["case", "what", "published", "flexik"])).markdown()
 
 
 def _number(value: float, entry: dict[str, str]) -> str:

@@ -56,6 +56,14 @@ class Table:
         blocks = [caption, "\n".join(rows), "\n".join(f"- {note}" for note in notes)]
         return "\n\n".join(filter(None, blocks)) + "\n"
 
+    def write(
+        self, path_without_suffix: Path | str, caption: str = "", notes: Sequence[str] = ()
+    ) -> None:
+        """Write `.csv` and `.md`, which are appended, each whole or not at all."""
+        csv, text = self.csv, self.markdown(caption, notes)
+        write_text(f"{path_without_suffix}.csv", csv)
+        write_text(f"{path_without_suffix}.md", text)
+
     def _cells(self, extra: int) -> pd.DataFrame:
         """All cells as text."""
         places = self.decimals
@@ -103,30 +111,6 @@ def table(rows: pd.DataFrame | Sequence[Mapping], columns: Mapping[str, Any]) ->
 def spread(values: pd.Series) -> dict[str, Any]:
     """What hangs on the draw, of the values of all restarts."""
     return {"least": values.min(), "median": values.median(), "largest": values.max()}
-
-
-def write_table(
-    path_without_suffix: Path | str,
-    frame: pd.DataFrame,
-    decimals: Decimals = DECIMALS,
-    caption: str = "",
-    notes: Sequence[str] = (),
-) -> None:
-    """Write a Table to `.csv` and `.md`, which are appended, each whole or not at all."""
-    made = Table(frame, decimals)
-    csv, text = made.csv, made.markdown(caption, notes)
-    write_text(f"{path_without_suffix}.csv", csv)
-    write_text(f"{path_without_suffix}.md", text)
-
-
-def markdown(
-    frame: pd.DataFrame,
-    decimals: Decimals = DECIMALS,
-    caption: str = "",
-    notes: Sequence[str] = (),
-) -> str:
-    """Markdown of a Table."""
-    return Table(frame, decimals).markdown(caption, notes)
 
 
 def _text(value: object, places: int, column: object) -> str:
