@@ -467,7 +467,7 @@ def test_figures_show_the_campaign_and_the_adaptation(results):
     }
 
     def drawn(drawing):
-        return drawing.kind(*drawing.data, **drawing.options).axes
+        return drawing().axes
 
     bars = [
         [

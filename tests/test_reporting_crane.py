@@ -314,12 +314,12 @@ def test_figures_are_drawn(results, tmp_path):
     drawn = report.content(results).figures
     for name in ("crane", "training_points", "initial_positions", "under_and_overfitting"):
         with style.house_style():
-            figure = drawn[name].kind(*drawn[name].data, **drawn[name].options)
+            figure = drawn[name]()
             figure.draw_without_rendering()
         assert all(axes.has_data() for axes in figure.axes if axes.axison), name
     failed = changed(results, "direct", status=[NOT_CONVERGED, *[0] * 7])
     figure = report.content(failed).figures["positioning_errors_direct"]
-    marks = {layer.mark for layer in figure.data}
+    marks = {layer.mark for layer in figure.args}
     assert marks == {"o", "x"}
 
 
@@ -331,7 +331,7 @@ def test_links_end_at_the_tip_of_their_strokes():
 
 
 def test_the_title_of_the_crane_states_its_deflection(results):
-    title = crane(GEOMETRY, results.shape).options["titles"]
+    title = crane(GEOMETRY, results.shape).keywords["titles"]
     assert "470 kg" in title and "Tip deflection 5.0 mm (3.0 mm back, 4.0 mm down)" in title
 
 

@@ -327,7 +327,7 @@ def test_times_of_other_parameters_are_left_out():
 def test_every_figure_is_drawn_and_every_metric_is_a_number(results):
     found = content(results)
     for name, drawing in found.figures.items():
-        assert drawing.kind(*drawing.data, **drawing.options).axes, name
+        assert drawing().axes, name
     assert len(found.figures) == 8
     assert all(value is not None for value in found.metrics.values())
     assert 0.0 < found.metrics["newton2.peak_elbow_rad"] < 1e-9

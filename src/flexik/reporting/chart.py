@@ -203,12 +203,7 @@ def _place(values: pd.Series, axis: Axis) -> Array:
 
 
 def _draw(
-    axes: Axes,
-    layer: Layer,
-    frame: pd.DataFrame,
-    x: Axis,
-    y: Axis,
-    looks: Mapping[Any, Look],
+    axes: Axes, layer: Layer, frame: pd.DataFrame, x: Axis, y: Axis, looks: Mapping[Any, Look]
 ) -> None:
     if frame.empty:
         return

@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -30,18 +30,12 @@ DRAWING = ("style", "chart", "kinds", "plane")
 FEW = 3  # figures that are drawn sooner than other processes start
 
 
-@dataclass(frozen=True)
-class Drawing:
-    """A figure to draw: `kind(*data, **options)`, a function of some module."""
-
-    kind: Callable[..., Figure]
-    data: tuple[Any, ...]
-    options: Mapping[str, Any]
+Drawing = partial[Figure]  # a figure that is drawn when it is called
 
 
 def draw(kind: Callable[..., Figure], *data: Any, **options: Any) -> Drawing:
     """Figure of `kind` (reporting.chart, kinds, plane, or one of a case), drawn later."""
-    return Drawing(kind, data, options)
+    return partial(kind, *data, **options)
 
 
 @dataclass(frozen=True)
@@ -140,8 +134,7 @@ def _draw_all(
 
 
 def _draw(job: tuple[Path, Drawing]) -> None:
-    path, drawing = job
-    style.write_png(path, drawing.kind, *drawing.data, **drawing.options)
+    style.write_png(*job)
 
 
 def digest(value: Any) -> str:
@@ -179,6 +172,8 @@ def _parts(value: Any) -> Iterable[bytes]:
     elif is_dataclass(value):
         for each in fields(value):
             yield from _parts(getattr(value, each.name))
+    elif isinstance(value, partial):
+        yield from _parts([value.func, value.args, value.keywords])
     elif callable(value):
         yield f"{value.__module__}.{value.__qualname__} {_code(value.__module__)}".encode()
     else:
