@@ -13,7 +13,7 @@ from flexik.cases.elastic_arm.parts.gauges import FREE_OF_NOISE, NOISY
 from flexik.cases.elastic_arm.parts.kinds import KINDS
 from flexik.cases.elastic_arm.parts.readings import ANGLES, TRAINING
 from flexik.cases.elastic_arm.report_figures import figures, shown_networks
-from flexik.cases.elastic_arm.report_results import NEAR, PUBLISHED, R, Results, chosen
+from flexik.cases.elastic_arm.report_results import NEAR, PUBLISHED, R, Results, chosen, hyphened
 from flexik.cases.elastic_arm.section import Section
 from flexik.files import read_json
 from flexik.kinematics.elastic_arm import DEFORMATION
@@ -117,7 +117,10 @@ def tables(results: Results) -> dict[str, Table]:
         "splits": splits_table(results),
         "gauges": gauges_table(results),
         "training": Table(training, {"training_error": 6, "selection_error": 6}),
-        **{f"size_selection/{name}": size_table(results, name) for name in selected(results)},
+        **{
+            f"size_selection/{name}": Table(by_size(results.of(f"sizes/{name}")), 6)
+            for name in selected(results)
+        },
     }
 
 
@@ -127,12 +130,9 @@ def splits_table(results: Results) -> Table:
     rows = splits.assign(seed=splits["seed"].astype(str), division="other")
     rows.loc[0, "division"] = "main"
     published = results.fits.loc[results.main, [f"published_{name}" for name in R]]
-    below = {
-        "median": r.median(),
-        "largest - least": r.max() - r.min(),
-        "published": published.set_axis(R),
-    }
-    rows = pd.concat([rows, pd.DataFrame(below).T.rename_axis("division").reset_index()])
+    below = pd.DataFrame({"median": r.median(), "largest - least": r.max() - r.min()})
+    below["published"] = published.set_axis(R)
+    rows = pd.concat([rows, below.T.rename_axis("division").reset_index()])
     titles = {f"R {angle}": Column(name, 6) for angle, name in zip(ANGLES, R, strict=True)}
     return table(rows.fillna({"seed": ""}), {"division": "division", "seed": "seed", **titles})
 
@@ -164,9 +164,8 @@ def gauges_table(results: Results) -> Table:
     for noise in (FREE_OF_NOISE, NOISY):
         difference = MM * (results.shown(noise)[names] - model).abs()
         for statistic in ("mean", "max"):
-            title = f"{statistic} difference, {noise.replace('_', '-')}"
-            frame[title] = difference.agg(statistic)
-    return Table(frame, dict.fromkeys(map(str, frame.columns[2:]), 5))
+            frame[f"{statistic} difference, {hyphened(noise)}"] = difference.agg(statistic)
+    return Table(frame, 5)
 
 
 def selected(results: Results) -> list[str]:
@@ -174,27 +173,16 @@ def selected(results: Results) -> list[str]:
     return [name for name, network in results.section.networks.items() if network.is_selected]
 
 
-def size_table(results: Results, name: str) -> Table:
-    """Errors of every size of a study."""
-    sizes = by_size(results.of(f"sizes/{name}"))
-    counts = [c for c in sizes if str(c).startswith(("n_", "best_"))]
-    errors = [str(c) for c in sizes if str(c).endswith("_error")]
-    return Table(sizes.astype(dict.fromkeys(counts, int)), dict.fromkeys(errors, 6))
-
-
 def values(results: Results) -> dict[str, Any]:
     """What the sentences of the page hold."""
-    section, exact = results.section, results.shown(FREE_OF_NOISE)
-    readings = results.readings
+    section, exact, readings = results.section, results.shown(FREE_OF_NOISE), results.readings
     voltages = exact.filter(like="voltage").to_numpy()
     tip = readings[["tip_x", "tip_y"]].to_numpy()
-    shown = {noise.replace("_", "-"): results.shown(noise) for noise in (FREE_OF_NOISE, NOISY)}
     used = {network.trainer for network in section.networks.values()}
     return {
         "results": results,
         "section": section,
         "given": section.machine.gauges,
-        "main": results.main,
         "counts": read_json(section.data / f"samples/{results.conditions}.json"),
         "n_of_part": readings["part"].value_counts().to_dict(),
         "dx": [exact[f"dx_{link}"].abs().max() for link in (1, 2)],
@@ -203,8 +191,8 @@ def values(results: Results) -> dict[str, Any]:
         "voltages": [voltages.min(), voltages.max()],
         "n_clipped": gauges.n_clipped(section.machine, voltages),
         "gauge_tip": {
-            noise: np.hypot(*(rows[["p_x", "p_y"]].to_numpy() - tip).T)
-            for noise, rows in shown.items()
+            hyphened(noise): np.hypot(*(results.shown(noise)[["p_x", "p_y"]].to_numpy() - tip).T)
+            for noise in (FREE_OF_NOISE, NOISY)
         },
         "fits": results.fits.to_dict("index"),
         "positioning": results.positioning.to_dict("index"),
@@ -213,7 +201,6 @@ def values(results: Results) -> dict[str, Any]:
         "trainers": {name: t for name, t in section.trainers.items() if name in used},
         "sizes": {name: size_values(results, name) for name in selected(results)},
         "depths": depths(results),
-        "splits": results.splits,
         **sensitivity_values(results),
     }
 

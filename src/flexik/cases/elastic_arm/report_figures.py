@@ -74,9 +74,7 @@ def deformation(results: Results, link: int) -> Drawing:
     }
     pose = readings[["theta_2", "payload"]]
     lines, dots = (
-        pd.concat(
-            [pose.assign(value=of[k], panel=panel) for panel, of in panels.items() if k in of]
-        )
+        pd.concat(pose.assign(value=of[k], panel=panel) for panel, of in panels.items() if k in of)
         for k in ("lines", "dots")
     )
     return draw(
@@ -87,7 +85,6 @@ def deformation(results: Results, link: int) -> Drawing:
         y={panel: of["axis"] for panel, of in panels.items()},
         panel="panel",
         columns=2,
-        share="x",
         looks=style.shades(readings["payload"]),
         legend="model, or gauges without noise (lines), gauges with noise (dots)",
     )
@@ -122,7 +119,6 @@ def target_and_network(results: Results, name: str) -> Drawing:
         titles=titles,
         panel="quantity",
         columns=2,
-        share="",
         height=7.2,
     )
 

@@ -38,6 +38,11 @@ def chosen(frame: pd.DataFrame) -> pd.DataFrame:
     return frame[frame["chosen"] == 1]
 
 
+def hyphened(name: str) -> str:
+    """Name of what gauges show, as it is written."""
+    return name.replace("_", "-")
+
+
 def by_restart(values: pd.Series, decimals: int) -> str:
     """Millimetres of the restarts of a network, in their order."""
     return ", ".join(f"{MM * value:.{decimals}f}" for value in values)
@@ -90,10 +95,8 @@ class Results:
     @functools.cached_property
     def errors(self) -> dict[str, pd.DataFrame]:
         """Long tables of the methods at the random targets; n_clipped among the columns."""
-        tables = {
-            label: self.of(f"errors/{self.conditions}/{label}") for label in self.section.methods
-        }
-        return {k: frame.assign(n_clipped=frame.get("n_clipped", 0)) for k, frame in tables.items()}
+        frames = {k: self.of(f"errors/{self.conditions}/{k}") for k in self.section.methods}
+        return {k: frame.assign(n_clipped=frame.get("n_clipped", 0)) for k, frame in frames.items()}
 
     @functools.cached_property
     def fits(self) -> pd.DataFrame:
@@ -104,17 +107,14 @@ class Results:
         """
         every, published = self.of("studies/fit.restarts"), read_csv(PUBLISHED, R, ("network",))
         rows = chosen(every).set_index("network").loc[list(self.section.gauge_networks)]
-        rows = rows.join(published.set_index("network")[R].add_prefix("published_"))
         starts = every.groupby("network")
-        rows = rows.join(starts[R].min().add_prefix("worst_"))
-        rows = rows.join(starts[R].max().add_prefix("best_"))
+        known = published.set_index("network")[R].add_prefix("published_")
+        worst, best = starts[R].min().add_prefix("worst_"), starts[R].max().add_prefix("best_")
+        rows = rows.join([known, worst, best])
         networks = [self.section.networks[str(name)] for name in rows.index]
         rows["hidden"] = [self.hidden(str(name)) for name in rows.index]
         rows["trainer"] = [network.trainer for network in networks]
-        rows["gauges"] = [
-            network.readings.replace("_", "-") + EXTRA.get(network.learns, "")
-            for network in networks
-        ]
+        rows["gauges"] = [hyphened(n.readings) + EXTRA.get(n.learns, "") for n in networks]
         rows["mean_errors"] = starts["mean_error"].agg(by_restart, 2)
         rows[[f"targets_{r}" for r in R]] = np.nan
         right = self.of(f"samples/{self.conditions}")[list(ANGLES)].to_numpy()
@@ -142,7 +142,7 @@ class Results:
                 network = self.section.networks[method.network]
                 restarts = self.of(f"errors/{self.conditions}/{label}.restarts")
                 row["knows"] = KNOWS.get(network.learns, "target, payload")
-                row["gauges"] = network.readings.replace("_", "-") if network.has_gauges else ""
+                row["gauges"] = hyphened(network.readings) if network.has_gauges else ""
                 row |= {"hidden": self.hidden(method.network), "trainer": network.trainer}
                 row["mean_errors"] = by_restart(restarts["mean_error"], 3)
                 row["max_errors"] = by_restart(restarts["max_error"], 3)

@@ -24,7 +24,6 @@ ERRORS = {
     "orientation_error": Axis("orientation error (deg)", DEGREES, log=True, least=FLOOR),
 }
 THIN = {"linewidth": 0.9, "marker": ""}
-UNTITLED = dict.fromkeys(ERRORS, "")
 REACHED = Axis("", 100.0, limits=(-4.0, 104.0))
 
 
@@ -88,7 +87,7 @@ def figures(results: Results) -> dict[str, Drawing]:
             Layer(ends, "share", "value", "-", "method", look=THIN),
             x=SHARE,
             y=ERRORS,
-            titles=UNTITLED,
+            titles="",
             **by_joint | {"panel": "kind", "columns": 1, "height": 6.0},
         ),
         **{f"study_{name}": _study(results, name) for name in results.studies},
@@ -224,7 +223,7 @@ def _whole_workspace(results: Results) -> Drawing:
             Rule("x", MM * limits.position, "counts as reached", cut, "error"),
             Rule("x", DEGREES * limits.orientation, "", cut, "orientation_error"),
         ],
-        titles=UNTITLED,
+        titles="",
         columns=2,
         height=4.4,
     )
