@@ -120,12 +120,11 @@ def _draw_all(
     wanted = {name: digest(drawing) for name, drawing in figures.items()}
     # absolute: processes that draw may have begun elsewhere
     paths = {name: folder.absolute() / f"figures/{name}.png" for name in figures}
-    todo = [
-        name
+    jobs = [
+        (path, figures[name])
         for name, path in paths.items()
         if not path.is_file() or earlier.get(name) != [wanted[name], file_checksum(path)]
     ]
-    jobs = [(paths[name], figures[name]) for name in todo]
     # here, never on a cluster: files are written
     n_workers = 1 if len(jobs) <= FEW else from_environment(ParallelSettings()).n_workers
     for _ in parallel_map(_draw, jobs, ParallelSettings(n_workers), "figures"):
@@ -153,10 +152,8 @@ def _parts(value: Any) -> Iterable[bytes]:
     if value is None or isinstance(value, str | int | float | np.number | np.bool_):
         yield repr(value).encode()
     elif isinstance(value, pd.DataFrame | pd.Series):
-        frame = value.to_frame() if isinstance(value, pd.Series) else value
-        yield from _parts([str(name) for name in frame.columns])
-        for k in range(frame.shape[1]):
-            yield from _parts(frame.iloc[:, k].to_numpy())
+        for name, column in pd.DataFrame(value).items():
+            yield from _parts([str(name), column.to_numpy()])
     elif isinstance(value, np.ndarray):
         yield f"{value.dtype} {value.shape}".encode()
         if value.dtype.hasobject:
@@ -170,8 +167,7 @@ def _parts(value: Any) -> Iterable[bytes]:
         for item in value:
             yield from _parts(item)
     elif is_dataclass(value):
-        for each in fields(value):
-            yield from _parts(getattr(value, each.name))
+        yield from _parts([getattr(value, each.name) for each in fields(value)])
     elif isinstance(value, partial):
         yield from _parts([value.func, value.args, value.keywords])
     elif callable(value):

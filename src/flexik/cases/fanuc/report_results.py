@@ -133,10 +133,13 @@ class Results:
 
         A share of the range; inf where the last pass is not below.
         """
-        ordered = self.curves.sort_values("iteration")
-        groups = ordered.groupby(["network", "joint", "restart"], sort=False)["training_error"]
-        passes = groups.agg(lambda curve: _stays_below(curve.to_numpy(), error))
-        return passes.rename("passes").reset_index()
+        above = ~(self.curves["training_error"] <= error)
+        curves = self.curves.assign(passes=(self.curves["iteration"] + 1.0).where(above, 0.0))
+        groups = curves.groupby(["network", "joint", "restart"], sort=False)
+        found = groups[["iteration", "passes"]].max().reset_index()
+        return found.assign(
+            passes=found["passes"].where(found["passes"] <= found["iteration"], np.inf)
+        )
 
     def study_statistics(self, varied: str) -> pd.DataFrame:
         """A row a value of what was varied: errors over the starts in percent, runs ended early."""
@@ -165,12 +168,6 @@ def having(frame: pd.DataFrame, **chosen: Any) -> pd.DataFrame:
 def label(method: str, n_steps: int) -> str:
     """Name of a method with Newton steps after it."""
     return f"{method}_refined_{n_steps}" if n_steps else method
-
-
-def _stays_below(errors: Array, limit: float) -> float:
-    above = np.flatnonzero(~(errors <= limit))
-    first = 0 if not len(above) else int(above[-1]) + 1
-    return float(first) if first < len(errors) else np.inf
 
 
 def read(section: Section) -> Results:
@@ -222,13 +219,13 @@ def judged(errors: pd.DataFrame, success: Success) -> pd.DataFrame:
 
 def published(path: Path) -> pd.DataFrame:
     """Published total errors by joint; raises DataError unless they are percentages."""
-    table = read_csv(path, ("joint", *PUBLISHED_NETWORKS), keys=("joint",))
-    for name in PUBLISHED_NETWORKS:
-        wrong = table[(table[name] < 0.0) | (table[name] > 100.0)]
-        if len(wrong):
-            joint, value = wrong["joint"].iloc[0], wrong[name].iloc[0]
+    table = read_csv(path, ("joint", *PUBLISHED_NETWORKS), keys=("joint",)).set_index("joint")
+    for name, (joint, value) in (
+        (n, item) for n in PUBLISHED_NETWORKS for item in table[n].items()
+    ):
+        if value < 0.0 or value > 100.0:
             raise DataError(f"{path}: {name}, joint {joint}: expected 0 to 100 %, got {value}")
-    return table.set_index("joint")
+    return table
 
 
 def query_settings(section: Section) -> str:

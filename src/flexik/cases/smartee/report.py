@@ -44,7 +44,6 @@ N_STRETCHES = 5
 # What STEPS Newton steps after a network are to reach, rad
 TARGET = 1e-9
 DRAWN = ("goal", "5 %", "median", "95 %")
-TIMES = {"single (us)": "microseconds_single", "batched (us)": "microseconds_batched"}
 # Sets of poses by the prefix of their metrics
 PREFIXES = {"": "validation", "random_": "random", "corners_": "corners"}
 GEOMETRIES = {
@@ -152,15 +151,18 @@ def direct_kinematics(results: Results) -> pd.DataFrame:
     rows = []
     for name, method in section.methods.items():
         for n_steps in method.n_steps[name == "centre" :]:
-            fixed = method.tolerance is None
-            row: dict[str, object] = {"start": method.start}
-            row["Newton steps"] = str(n_steps) if fixed else "until converged"
-            for conditions in ("validation", "random", *paths):
-                row[conditions] = scientific(results.peak(name, n_steps, conditions))
             key = ("centre" if name == "previous" else name, n_steps)
-            for title, column in list(TIMES.items())[: 1 if name == "previous" else 2]:
-                row[title] = times[column].get(key, np.nan)
-            rows.append(row)
+            batched = np.nan if name == "previous" else times["microseconds_batched"].get(key)
+            peaks = {p: results.peak(name, n_steps, p) for p in ("validation", "random", *paths)}
+            rows.append(
+                {
+                    "start": method.start,
+                    "Newton steps": str(n_steps) if method.tolerance is None else "until converged",
+                    **{conditions: scientific(peak) for conditions, peak in peaks.items()},
+                    "single (us)": times["microseconds_single"].get(key),
+                    "batched (us)": batched,
+                }
+            )
     return pd.DataFrame(rows)
 
 
