@@ -206,12 +206,11 @@ def sequences(parts: Mapping[str, Sequence[float]], colours: Sequence[str]) -> F
         first = f"first {min(DETAIL, len(whole))} of {title}"
         titles |= {title: title, first: "" if titles else first.removesuffix(f" of {title}")}
         small, large = {"markersize": 1.5}, {"markersize": 3, "linewidth": 0.8}
-        for name, rows, mark, look in (
-            (title, whole, ".", small),
-            (first, whole[:DETAIL], ".-", large),
-        ):
-            rows = rows.assign(panel=name)
-            layers.append(Layer(rows, "number", "value", mark, look={"color": colour, **look}))
+        shown = (title, whole, ".", small), (first, whole[:DETAIL], ".-", large)
+        layers += [
+            Layer(rows.assign(panel=name), "number", "value", mark, look={"color": colour, **look})
+            for name, rows, mark, look in shown
+        ]
     x = {name: Axis("vector number") for name in titles}
     y = Axis("normalised (1)", limits=(-1.12, 1.12), ticks=(-1, 0, 1))
     layout: dict[str, Any] = {"columns": 2, "widths": (3, 1.3), "share": "y"}

@@ -114,20 +114,16 @@ def _arm(results: Results) -> Drawing:
             for view, (a, b) in views.items()
         )
 
-    taught = seen(path[["x", "y", "z"]].to_numpy())
+    taught, thin = seen(path[["x", "y", "z"]].to_numpy()), {"linewidth": 1.2, "color": style.ORANGE}
+    wide, dots = {"linewidth": 2.5}, {"markersize": 3.5, "color": style.INK}
     return draw(
         chart,
-        Layer(
-            taught, "a", "b", look={"color": style.ORANGE, "linewidth": 1.2}, label="taught path"
-        ),
-        Layer(seen(points), "a", "b", look={"color": style.BLUE, "linewidth": 2.5}, label="arm"),
-        Layer(
-            seen(links), "a", "b", "o", look={"color": style.INK, "markersize": 3.5}, label="frames"
-        ),
+        Layer(taught, "a", "b", label="taught path", look=thin),
+        Layer(seen(points), "a", "b", label="arm", look=wide),
+        Layer(seen(links), "a", "b", "o", label="frames", look=dots),
         x=Axis("x (m)"),
         y={"from the side": Axis("z (m)"), "from above": Axis("y (m)")},
         panel="view",
-        columns=2,
         share="",
         equal=True,
         height=4.2,
@@ -151,25 +147,23 @@ def _training(results: Results, names: list[str]) -> list[Layer]:
     curves = curves[curves["network"].isin(names)].sort_values([*keys, "iteration"])
     curves["joint"] = "joint " + curves["joint"].astype(str)
     pale = {"linewidth": 0.5, "alpha": 0.35, "marker": ""}
-    layers = []
-    for is_median, look, text in ((0, pale, ""), (1, THIN, "{}")):
-        rows = curves[curves["is_median"] == is_median]
-        if len(rows):
-            place = ("iteration", "training_error", "-", "network", "restart")
-            layers.append(Layer(rows, *place, text, look))
-    return layers
+    place = ("iteration", "training_error", "-", "network", "restart")
+    return [
+        Layer(rows, *place, *(("{}", THIN) if is_median else ("", pale)))
+        for is_median, rows in curves.groupby("is_median")
+    ]
 
 
 def _study(results: Results, varied: str) -> Drawing:
     errors = results.study_statistics(varied)
-    blue, orange = {"color": style.BLUE, "marker": "o"}, {"color": style.ORANGE, "marker": "s"}
-    sky, label_of_all = {"color": style.SKY}, "total error, all starts"
-    labels = ("total error on the test samples, median", "the same on the training samples, median")
+    orange, sky = {"color": style.ORANGE}, {"color": style.SKY}
+    spread, training = "total error, all starts", "the same on the training samples, median"
+    median = "total error on the test samples, median"
     return draw(
         chart,
-        Layer(errors, "value", "least", "band", to="largest", look=sky, label=label_of_all),
-        Layer(errors, "value", "median", "o-", look=blue, label=labels[0]),
-        Layer(errors, "value", "training", "s--", look=orange, label=labels[1]),
+        Layer(errors, "value", "least", "band", to="largest", look=sky, label=spread),
+        Layer(errors, "value", "median", "o-", label=median),
+        Layer(errors, "value", "training", "s--", look=orange, label=training),
         x=Axis(f"{VARIED[varied]} (1)", log=True, ticks=list(errors["value"])),
         y=Axis("mean absolute error (% of range)", log=True),
         titles=f"joint {getattr(results.section.studies, varied).joint}",
@@ -224,6 +218,5 @@ def _whole_workspace(results: Results) -> Drawing:
             Rule("x", DEGREES * limits.orientation, "", cut, "orientation_error"),
         ],
         titles="",
-        columns=2,
         height=4.4,
     )

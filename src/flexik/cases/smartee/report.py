@@ -269,6 +269,7 @@ def values(results: Results) -> dict[str, Any]:
     """Numbers for the sentences."""
     section, peak = results.section, results.peak
     near = peak("network", STEPS, "random")
+    wrong_elbows = newton(results).set_index("poses")["to wrong elbows"]
     steps = section.methods["centre"].n_steps
     ends = results.training.groupby("network")["stop_reason"]
     return {
@@ -286,11 +287,7 @@ def values(results: Results) -> dict[str, Any]:
         "times": {(r["method"], r["n_steps"]): r for r in results.query_times.to_dict("records")},
         "n_by_test": {name: int(rows.isin(("goal", "stationary")).sum()) for name, rows in ends},
         "wrong": n_wrong(results, STEPS),
-        "wrong_newton": {
-            row["poses"]: row["to wrong elbows"]
-            for row in newton(results).to_dict("records")
-            if row["to wrong elbows"]
-        },
+        "wrong_newton": wrong_elbows[wrong_elbows > 0].to_dict(),
         **report_starts.values(results),
     }
 
