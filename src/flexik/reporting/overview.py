@@ -43,9 +43,7 @@ def overview() -> str:
     rows = []
     for file in sorted(CASES.glob("*/overview.csv")):
         metrics = read_json(REPORTS / file.parent.name / "metrics.json")
-        with file.open(encoding="utf-8", newline="") as lines:
-            entries = list(csv.DictReader(lines))
-        for entry in entries:
+        for entry in csv.DictReader(file.read_text("utf-8").splitlines()):
             found = [v for name, v in metrics.items() if fnmatch(name, entry["metric"])]
             value = _number(sum(found) / len(found), entry) if found else ABSENT
             published = _published(file.parent.name, entry["published"])
@@ -60,11 +58,9 @@ def _number(value: float, entry: dict[str, str]) -> str:
 
 def _spread(metrics: dict[str, float], entry: dict[str, str]) -> str:
     """The two metrics that `spread` names, if it does and the run has both."""
-    ends = [metrics.get(name) for name in (entry.get("spread") or "").split()]
-    if not ends or None in ends:
-        return ""
-    low, high = (_number(float(end), entry) for end in ends if end is not None)
-    return f" ({low} to {high})"
+    named = [metrics.get(name) for name in (entry.get("spread") or "").split()]
+    ends = [_number(end, entry) for end in named if end is not None]
+    return f" ({ends[0]} to {ends[1]})" if len(ends) == 2 else ""
 
 
 def _published(case: str, where: str) -> str:

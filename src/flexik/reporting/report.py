@@ -72,8 +72,14 @@ def write_case(
     section: CaseSection, template: Path, content: Content, files: Iterable[Path | str]
 ) -> None:
     """Write the report of a case; it is made from its section, its machine and `files` too."""
-    sources = made_from(section, [section.machine_file, *files])
-    record = section.data / "report.json"
+    write_section(section, template, content, [section.machine_file, *files])
+
+
+def write_section(
+    section: CaseSection, template: Path, content: Content, files: Iterable[Path | str]
+) -> None:
+    """Write the report of a case whose section, machine included, and `files` it is made from."""
+    sources, record = made_from(section, files), section.data / "report.json"
     write_report(section.report, template, content, sources=sources, record=record)
 
 

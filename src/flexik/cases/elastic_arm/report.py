@@ -18,7 +18,7 @@ from flexik.cases.elastic_arm.section import Section
 from flexik.files import read_json
 from flexik.kinematics.elastic_arm import DEFORMATION
 from flexik.learning.size_selection import by_size
-from flexik.reporting.report import Content, made_from, write_report
+from flexik.reporting.report import Content, write_section
 from flexik.reporting.style import MICRO, MM
 from flexik.reporting.tables import Column, Table, mm, table
 
@@ -42,9 +42,7 @@ def report(section: Section) -> None:
     """Write reports/NAME from data/NAME."""
     results = Results(section)
     content = Content(tables(results), figures(results), metrics(results), values(results))
-    sources, record = made_from(section, [PUBLISHED]), section.data / "report.json"
-    template = Path(__file__).with_name("page.md.j2")
-    write_report(section.report, template, content, sources=sources, record=record)
+    write_section(section, Path(__file__).with_name("page.md.j2"), content, [PUBLISHED])
 
 
 def metrics(results: Results) -> dict[str, float | None]:
@@ -178,16 +176,13 @@ def values(results: Results) -> dict[str, Any]:
     section, exact, readings = results.section, results.shown(FREE_OF_NOISE), results.readings
     voltages = exact.filter(like="voltage").to_numpy()
     tip = readings[["tip_x", "tip_y"]].to_numpy()
-    used = {network.trainer for network in section.networks.values()}
     return {
         "results": results,
         "section": section,
         "given": section.machine.gauges,
         "counts": read_json(section.data / f"samples/{results.conditions}.json"),
         "n_of_part": readings["part"].value_counts().to_dict(),
-        "dx": [exact[f"dx_{link}"].abs().max() for link in (1, 2)],
-        "strain": [exact[f"strain_{link}"].abs().max() for link in (1, 2)],
-        "largest_dy": readings[["dy_1", "dy_2"]].abs().to_numpy().max(),
+        "largest": exact.abs().max(),
         "voltages": [voltages.min(), voltages.max()],
         "n_clipped": gauges.n_clipped(section.machine, voltages),
         "gauge_tip": {
@@ -198,7 +193,6 @@ def values(results: Results) -> dict[str, Any]:
         "positioning": results.positioning.to_dict("index"),
         "near": NEAR,
         "published_networks": shown_networks(results),
-        "trainers": {name: t for name, t in section.trainers.items() if name in used},
         "sizes": {name: size_values(results, name) for name in selected(results)},
         "depths": depths(results),
         **sensitivity_values(results),

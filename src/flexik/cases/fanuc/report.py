@@ -13,7 +13,7 @@ from flexik.cases.fanuc.report_figures import FLOOR, figures
 from flexik.cases.fanuc.report_results import PUBLISHED, VARIED, Results, having, label, read
 from flexik.cases.fanuc.section import EXACT, LOOKED_UP, PUBLISHED_NETWORKS, WHOLE, Section
 from flexik.kinematics.spherical_wrist import ELBOW, SHOULDER, WRIST
-from flexik.reporting.report import Content, made_from, write_report
+from flexik.reporting.report import Content, write_section
 from flexik.reporting.style import DEGREES, MM
 from flexik.reporting.tables import Column, Table, mm, spread, table
 
@@ -65,9 +65,7 @@ def report(section: Section) -> None:
     """Write reports/fanuc from data/fanuc."""
     results = read(section)
     content = Content(tables(results), figures(results), metrics(results), values(results))
-    sources, record = made_from(section, [PUBLISHED]), section.data / "report.json"
-    template = Path(__file__).with_name("page.md.j2")
-    write_report(section.report, template, content, sources=sources, record=record)
+    write_section(section, Path(__file__).with_name("page.md.j2"), content, [PUBLISHED])
 
 
 def tables(results: Results) -> dict[str, Table]:

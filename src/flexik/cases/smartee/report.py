@@ -26,7 +26,7 @@ from flexik.cases.smartee.report_results import (
 from flexik.cases.smartee.section import OutsidePoses, Section
 from flexik.kinematics.status import NOT_CONVERGED, OTHER_BRANCH, REACHED, SINGULAR
 from flexik.learning.starts import by_trainer
-from flexik.reporting.report import Content, made_from, write_report
+from flexik.reporting.report import Content, write_section
 from flexik.reporting.style import MM
 from flexik.reporting.tables import Column, Table, mm, spread, table
 
@@ -59,9 +59,7 @@ GEOMETRIES = {
 
 def report(section: Section) -> None:
     """Write reports/NAME from data/NAME."""
-    sources, record = made_from(section, [PUBLISHED_FILE]), section.data / "report.json"
-    found = content(read(section))
-    write_report(section.report, TEMPLATE, found, sources=sources, record=record)
+    write_section(section, TEMPLATE, content(read(section)), [PUBLISHED_FILE])
 
 
 def content(results: Results) -> Content:
