@@ -13,7 +13,7 @@ from flexik.cases.elastic_arm.parts.gauges import FREE_OF_NOISE, NOISY
 from flexik.cases.elastic_arm.parts.kinds import KINDS
 from flexik.cases.elastic_arm.parts.readings import ANGLES, TRAINING
 from flexik.cases.elastic_arm.report_figures import figures, shown_networks
-from flexik.cases.elastic_arm.report_results import NEAR, PUBLISHED, R, Results, chosen, hyphened
+from flexik.cases.elastic_arm.report_results import NEAR, PUBLISHED, R, Results, hyphened
 from flexik.cases.elastic_arm.section import Section
 from flexik.files import read_json
 from flexik.kinematics.elastic_arm import DEFORMATION
@@ -137,7 +137,7 @@ def splits_table(results: Results) -> Table:
 
 def sensitivity(results: Results) -> pd.DataFrame:
     """Mean tip errors in m by the input that is off, a column a network."""
-    rows = chosen(results.of("studies/sensitivity"))
+    rows = results.of("studies/sensitivity").query("chosen == 1")
     frame = rows.pivot_table(index="input", columns="network", values="mean_error")
     return frame.loc[rows["input"].unique(), rows["network"].unique()]
 

@@ -33,11 +33,6 @@ EXTRA = {"gauges_without_dx": ", without dx", "gauges_elbow": ", and elbow"}
 table = functools.cache(read_table)
 
 
-def chosen(frame: pd.DataFrame) -> pd.DataFrame:
-    """Rows of the restarts that were chosen."""
-    return frame[frame["chosen"] == 1]
-
-
 def hyphened(name: str) -> str:
     """Name of what gauges show, as it is written."""
     return name.replace("_", "-")
@@ -94,9 +89,8 @@ class Results:
 
     @functools.cached_property
     def errors(self) -> dict[str, pd.DataFrame]:
-        """Long tables of the methods at the random targets; n_clipped among the columns."""
-        frames = {k: self.of(f"errors/{self.conditions}/{k}") for k in self.section.methods}
-        return {k: frame.assign(n_clipped=frame.get("n_clipped", 0)) for k, frame in frames.items()}
+        """Long tables of the methods at the random targets."""
+        return {k: self.of(f"errors/{self.conditions}/{k}") for k in self.section.methods}
 
     @functools.cached_property
     def fits(self) -> pd.DataFrame:
@@ -106,15 +100,15 @@ class Results:
         not vary; worst_, best_: of all restarts.
         """
         every, published = self.of("studies/fit.restarts"), read_csv(PUBLISHED, R, ("network",))
-        rows = chosen(every).set_index("network").loc[list(self.section.gauge_networks)]
+        networks = self.section.gauge_networks
+        rows = every[every["chosen"] == 1].set_index("network").loc[list(networks)]
         starts = every.groupby("network")
         known = published.set_index("network")[R].add_prefix("published_")
         worst, best = starts[R].min().add_prefix("worst_"), starts[R].max().add_prefix("best_")
         rows = rows.join([known, worst, best])
-        networks = [self.section.networks[str(name)] for name in rows.index]
-        rows["hidden"] = [self.hidden(str(name)) for name in rows.index]
-        rows["trainer"] = [network.trainer for network in networks]
-        rows["gauges"] = [hyphened(n.readings) + EXTRA.get(n.learns, "") for n in networks]
+        rows["hidden"] = [self.hidden(name) for name in networks]
+        rows["trainer"] = [network.trainer for network in networks.values()]
+        rows["gauges"] = [hyphened(n.readings) + EXTRA.get(n.learns, "") for n in networks.values()]
         rows["mean_errors"] = starts["mean_error"].agg(by_restart, 2)
         rows[[f"targets_{r}" for r in R]] = np.nan
         right = self.of(f"samples/{self.conditions}")[list(ANGLES)].to_numpy()
@@ -132,7 +126,7 @@ class Results:
         for label, frame in self.errors.items():
             method, error = methods[label], frame["error"]
             row: dict[str, Any] = dict(workspace_statistics(frame))
-            row["clipped"] = int((frame["n_clipped"] > 0).sum())
+            row["clipped"] = int((frame["n_clipped"] > 0).sum()) if "n_clipped" in frame else 0
             row["n_worse"] = int((error > self.errors[none]["error"]).sum())
             apart = np.abs(frame["payload"].to_numpy()[:, None] - self.section.samples.payloads)
             near = apart.min(axis=1) <= NEAR

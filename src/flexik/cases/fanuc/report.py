@@ -131,10 +131,9 @@ def passes(results: Results) -> Table:
     columns: dict[str, list[object]] = {"joint": list(JOINTS)}
     for name, error in itertools.product(results.networks, PASS_ERRORS):
         needed = having(results.passes_needed(error), network=name).groupby("joint")["passes"]
-        counts = needed.quantile(0.5, interpolation="higher")
-        columns[f"{name} to {100 * error:g} %"] = [
-            int(counts[joint]) if np.isfinite(counts[joint]) else None for joint in JOINTS
-        ]
+        counts = needed.quantile(0.5, interpolation="higher")[list(JOINTS)]
+        title = f"{name} to {100 * error:g} %"
+        columns[title] = [int(count) if np.isfinite(count) else None for count in counts]
     return Table(pd.DataFrame(columns, dtype=object), 0)
 
 
@@ -217,7 +216,8 @@ def values(results: Results) -> dict[str, Any]:
     section = results.section
     shapes = {n: (e.learns, e.sizes, e.activation) for n, e in section.path_networks.items()}
     firsts = {n: next(o for o in shapes if shapes[o] == shape) for n, shape in shapes.items()}
-    on_path = results.statistics["path"].to_dict("index")
+    on_path = results.statistics["path"]
+    mean = on_path["mean"]
     return {
         "results": results,
         "section": section,
@@ -225,13 +225,10 @@ def values(results: Results) -> dict[str, Any]:
         "verdict": verdict(results),
         "twins": {name: first for name, first in firsts.items() if first != name},
         "kept": kept(results),
-        "on_path": on_path,
+        "on_path": mean,
         "looked_up": LOOKED_UP,
-        "beaten": {
-            each: [n for n in results.networks if on_path[each]["mean"] < on_path[n]["mean"]]
-            for each in LOOKED_UP
-        },
-        "turns": [DEGREES * on_path[name]["mean_turn"] for name in results.networks],
+        "beaten": {k: [n for n in results.networks if mean[k] < mean[n]] for k in LOOKED_UP},
+        "turns": DEGREES * on_path.loc[results.networks, "mean_turn"],
         "reached_degrees": DEGREES * section.success.orientation,
         "floor": FLOOR,
         "studies": {name: {"what": VARIED[name], **_study(results, name)} for name in VARIED},
@@ -285,24 +282,19 @@ def _study(results: Results, varied: str) -> dict[str, Any]:
 
 
 def off_path(results: Results) -> dict[str, Any]:
-    """Targets left out; ends of the means; where networks beat looking up; how far all reach."""
+    """Targets left out; mean errors, and the least of looking up; how far all reach."""
     section, frame, last = results.section, results.of("off_path"), results.n_steps
     distances, n_test = section.conditions.off_path.distances, section.samples.path.n_test
     counts = having(frame, method=EXACT).groupby("distance").size()
     there = [distance for distance in distances if distance in counts]
-    means = having(frame, n_steps=0).groupby(["method", "distance"])["error"].mean()
-    best = {d: min(means[name, d] for name in LOOKED_UP) for d in there}
+    means = having(frame, n_steps=0).pivot_table("error", "distance", "method")
+    means = means.reindex(index=there, columns=section.path_methods)
     ends = having(results.start_errors, conditions="off_path", n_steps=last)
     return {
         "left_out": {d: n_test - n for d in distances if (n := counts.get(d, 0)) < n_test},
         "distances": there,
-        "ends": {
-            name: [(d, means[name, d]) for d in dict.fromkeys(there[:1] + there[-1:])]
-            for name in section.path_methods
-        },
-        "wins": {
-            name: [MM * d for d in there if means[name, d] < best[d]] for name in results.networks
-        },
+        "by_distance": means,
+        "best": means[list(LOOKED_UP)].min(axis=1),
         "reach": {
             label(name, last): _reach(having(frame, method=name, n_steps=last))
             for name in (*section.path_methods, WHOLE)
