@@ -14,8 +14,6 @@ PENALISED, UNPENALISED = "regularised_cg", "unpenalised_cg"
 # A median error this near, relatively, to that of the best linear map is at its plateau
 PLATEAU = 0.1
 CAPPED = "iterations"
-
-
 STARTS = {
     "trainer": "trainer",
     "start": "spread",
@@ -57,11 +55,9 @@ def starts(results: Results) -> Table:
 
 def thresholds(results: Results) -> pd.DataFrame:
     """Share (%) of the starts that end at or below each error, a row a trainer and spread."""
-    rows = []
-    for (trainer, start), group in results.starts.groupby(["trainer", "spread"], sort=False):
-        shares = {f"{v:g} (%)": _share(group["error"], v) for v in _limits(results)}
-        rows.append({"trainer": trainer, "start": start, **shares})
-    return pd.DataFrame(rows)
+    errors = results.starts.groupby(["trainer", "spread"], sort=False)["error"]
+    shares = pd.DataFrame({f"{v:g} (%)": errors.agg(_share, v) for v in _limits(results)})
+    return shares.rename_axis(["trainer", "start"]).reset_index()
 
 
 def sensitivity(results: Results) -> pd.DataFrame:
@@ -92,7 +88,7 @@ def sizes(results: Results) -> pd.DataFrame:
 def values(results: Results) -> dict[str, Any]:
     """Numbers for the sentences."""
     own, times = results.section.studies.starts, results.training_times
-    reached = times["long_error"] <= own.success
+    reached, ends = times["long_error"] <= own.success, by_trainer(results.starts)
     return {
         "starts": own,
         "untuned": [name for name in own.trainers if name not in own.tuned],
@@ -101,11 +97,7 @@ def values(results: Results) -> dict[str, Any]:
         "differing": _differing(results),
         "penalty": _penalty(results),
         "all_capped": set(results.starts["stop_reason"]) == {CAPPED},
-        "plateaus": [
-            row
-            for row in by_trainer(results.starts).to_dict("records")
-            if abs(row["median_error"] / results.linear_error - 1.0) <= PLATEAU
-        ],
+        "plateaus": ends[(ends["median_error"] / results.linear_error - 1.0).abs() <= PLATEAU],
         "seconds": times["seconds"].tolist(),
         "long": times[["n_starts", "long_factor"]].astype(int).to_dict("records")[:1],
         "long_runs": [
