@@ -106,8 +106,10 @@ def tables(results: Results) -> dict[str, Table]:
     )
     front = ["network", "hidden", "restart"]
     training = training[[*front, *training.columns.difference(front, sort=False)]]
+    off, changes = MM * sensitivity(results), results.of("studies/sensitivity").groupby("input")
+    off.insert(0, "off by (um, urad)", MICRO * changes["change"].first())
     return {
-        "sensitivity": sensitivity_table(results),
+        "sensitivity": Table(off.rename_axis("input that is off").reset_index(), 3),
         "positioning_errors": table(
             results.positioning.rename_axis("method").reset_index(), POSITIONING
         ),
@@ -140,14 +142,6 @@ def sensitivity(results: Results) -> pd.DataFrame:
     rows = results.of("studies/sensitivity").query("chosen == 1")
     frame = rows.pivot_table(index="input", columns="network", values="mean_error")
     return frame.loc[rows["input"].unique(), rows["network"].unique()]
-
-
-def sensitivity_table(results: Results) -> Table:
-    """The same in mm, and by how much the input is off."""
-    frame = MM * sensitivity(results)
-    off = results.of("studies/sensitivity").groupby("input")["change"].first()
-    frame.insert(0, "off by (um, urad)", MICRO * off)
-    return Table(frame.rename_axis("input that is off").reset_index(), 3)
 
 
 def gauges_table(results: Results) -> Table:

@@ -25,7 +25,9 @@ def figures(results: Results) -> dict[str, Drawing]:
     """All figures by name."""
     frames = results.errors.items()
     errors = pd.concat([frame.assign(method=label) for label, frame in frames])
-    shown = errors[~errors["method"].isin(hidden_methods(results))]
+    # the first method of every kind, but not no compensation
+    first = {m.method: label for label, m in reversed(results.section.methods.items())}
+    shown = errors[errors["method"].isin([first[kind] for kind in first if kind != "none"])]
     error, place = Axis("error (mm)", MM, log=True), ("target_x", "target_y", "error", "method")
     distribution = draw(kinds.distribution, errors, "error", "method", error, what="targets")
     return {
@@ -44,13 +46,6 @@ def shown_networks(results: Results) -> list[str]:
     """Networks whose values are published, or the first one."""
     published = results.fits[f"published_{R[0]}"].notna()
     return [str(name) for name in results.fits.index[published]] or [results.main]
-
-
-def hidden_methods(results: Results) -> list[str]:
-    """All but the first method of every kind, and no compensation."""
-    kinds_of = {label: method.method for label, method in results.section.methods.items()}
-    first = {kind: label for label, kind in reversed(kinds_of.items())}
-    return [label for label, kind in kinds_of.items() if kind == "none" or first[kind] != label]
 
 
 def deformation(results: Results, link: int) -> Drawing:

@@ -38,11 +38,24 @@ N_BINS = 20  # of the extent
 def figures(results: Results) -> dict[str, Drawing]:
     """Figures by name."""
     looks = style.looks(results.section.methods)
+    given = results.section.studies.starts
     sizes, published = results.section.studies.sizes.poses, results.section.networks[PUBLISHED]
     return {
         "mechanism": mechanism(results),
         **{f"{quantity}_errors": pose_errors(results, quantity, looks) for quantity in QUANTITIES},
-        "starts": starts(results),
+        "starts": draw(
+            kinds.distribution,
+            *(results.starts[["trainer", "spread", "error"]], "error", "trainer"),
+            Axis("mean squared error, normalised (1)", log=True),
+            what="starts",
+            panel="spread",
+            of_all=True,
+            titles={spread: f"starts {spread}" for spread in given.spreads},
+            looks=style.looks(given.trainers),
+            rules=[Rule("x", given.success, "success")],
+            share="xy",
+            columns=2,
+        ),
         "newton_steps": newton_steps(results),
         "outside": outside(results),
         "sizes": draw(
@@ -69,26 +82,6 @@ def pose_errors(results: Results, quantity: str, looks: dict) -> Drawing:
         looks=looks,
         rules=[peak],
         height=3.6,
-    )
-
-
-def starts(results: Results) -> Drawing:
-    """Share of the starts that end below each error, a panel a spread, a line a trainer."""
-    given = results.section.studies.starts
-    return draw(
-        kinds.distribution,
-        results.starts[["trainer", "spread", "error"]],
-        "error",
-        "trainer",
-        Axis("mean squared error, normalised (1)", log=True),
-        what="starts",
-        panel="spread",
-        of_all=True,
-        titles={spread: f"starts {spread}" for spread in given.spreads},
-        looks=style.looks(given.trainers),
-        rules=[Rule("x", given.success, "success")],
-        share="xy",
-        columns=2,
     )
 
 

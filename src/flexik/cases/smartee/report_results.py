@@ -17,6 +17,8 @@ from flexik.learning.size_selection import by_size
 from flexik.reporting.style import MM, require
 
 BENCHMARKS = Path("reports/benchmarks")
+TIMES = ("n_steps", "microseconds_single", "microseconds_batched")
+TRAINING_TIMES = ("n_starts", "long_factor", "seconds", "long_seconds", "long_error")
 PUBLISHED_FILE = Path("data/reference/smartee/peaks.csv")
 # Errors by the name they have in metrics and in the file of published peaks
 QUANTITIES = {"elbow": "error", "position": "position_error", "orientation": "orientation_error"}
@@ -96,18 +98,10 @@ def read(section: Section) -> Results:
     starts = [study(f"starts_{name}") for name in studies.starts.trainers]
     sizes = {poses: by_size(study(f"sizes_{poses}")) for poses in studies.sizes.poses}
     linear = read_json(data / "studies/linear.json")
-    query_times = read_csv(
-        BENCHMARKS / "smartee.csv",
-        ("n_steps", "microseconds_single", "microseconds_batched"),
-        ("method", "settings"),
-        ("method", "n_steps"),
-    )
-    training_times = read_csv(
-        BENCHMARKS / "smartee_training.csv",
-        ("n_starts", "long_factor", "seconds", "long_seconds", "long_error"),
-        ("trainer", "spread", "settings"),
-        ("trainer", "spread"),
-    )
+    keys, names = ("method", "n_steps"), ("trainer", "spread")
+    query_times = read_csv(BENCHMARKS / "smartee.csv", TIMES, ("method", "settings"), keys)
+    file = BENCHMARKS / "smartee_training.csv"
+    training_times = read_csv(file, TRAINING_TIMES, (*names, "settings"), names)
     return Results(
         section=section,
         errors=_named(errors, "method", "conditions"),
