@@ -61,13 +61,6 @@ class Content:
         return Content(**pairs)
 
 
-def made_from(section: Any, files: Iterable[Path | str]) -> dict[str, str]:
-    """Checksums of the keys of `section` (a model of params.yaml) and of `files`."""
-    keys = section.model_dump(mode="json")
-    found = {f"params.yaml: {key}": digest(value) for key, value in keys.items()}
-    return found | {Path(path).as_posix(): file_checksum(path) for path in files}
-
-
 def write_case(
     section: CaseSection, template: Path, content: Content, files: Iterable[Path | str]
 ) -> None:
@@ -79,7 +72,10 @@ def write_section(
     section: CaseSection, template: Path, content: Content, files: Iterable[Path | str]
 ) -> None:
     """Write the report of a case whose section, machine included, and `files` it is made from."""
-    sources, record = made_from(section, files), section.data / "report.json"
+    keys = section.model_dump(mode="json")
+    sources = {f"params.yaml: {key}": digest(value) for key, value in keys.items()}
+    sources |= {Path(path).as_posix(): file_checksum(path) for path in files}
+    record = section.data / "report.json"
     write_report(section.report, template, content, sources=sources, record=record)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from flexik.cases.fanuc.parts.tables import COMMANDED_FIELDS, JOINT_FIELDS, array
+from flexik.cases.fanuc.parts.tables import COMMANDED_FIELDS, JOINT_FIELDS, arm_of, array
 from flexik.cases.fanuc.report_results import VARIED, Results, label
 from flexik.cases.fanuc.section import EXACT, LOOKED_UP, WHOLE
 from flexik.datasets.tables import Field
@@ -98,13 +98,13 @@ def figures(results: Results) -> dict[str, Drawing]:
 
 def _arm(results: Results) -> Drawing:
     """The arm halfway along the path, from the side and from above."""
-    path = results.path.sort_values("share")
+    path, arm = results.path.sort_values("share"), arm_of(results.section.machine.joints)
     middle = array(path, JOINT_FIELDS)[len(path) // 2 : len(path) // 2 + 1]
-    found = frames(results.arm, middle)
+    found = frames(arm, middle)
     links, turn = found.origin[0], found.rotation[0]
     # elbow: where the forearm begins, so that the links are drawn as they are
-    elbow = links[3] - results.arm.a[2] * turn[3][:, 0]
-    base = np.array([0.0, 0.0, results.arm.d[0]])
+    elbow = links[3] - arm.a[2] * turn[3][:, 0]
+    base = np.array([0.0, 0.0, arm.d[0]])
     points = np.vstack([links[0], base, links[1:3], elbow, links[3:]])
 
     def seen(values: np.ndarray) -> pd.DataFrame:

@@ -16,13 +16,12 @@ from flexik.cases.fanuc.parts.tables import (
     JOINT_FIELDS,
     PATH_FIELDS,
     QUERY_FIELDS,
-    arm_of,
     array,
 )
-from flexik.cases.fanuc.section import PUBLISHED_NETWORKS, Section, Success
+from flexik.cases.fanuc.section import PUBLISHED_NETWORKS, WHOLE, Section, Success
 from flexik.datasets.tables import read_csv, read_table
 from flexik.errors import DataError
-from flexik.kinematics.serial_arm import Array, SerialArm
+from flexik.kinematics.serial_arm import Array
 from flexik.kinematics.status import REACHED
 from flexik.reporting.report import digest
 
@@ -62,11 +61,6 @@ class Results:
     published: pd.DataFrame
     times: pd.DataFrame
     growth: pd.DataFrame
-
-    @property
-    def arm(self) -> SerialArm:
-        """The arm."""
-        return arm_of(self.section.machine.joints)
 
     @property
     def networks(self) -> list[str]:
@@ -220,11 +214,10 @@ def judged(errors: pd.DataFrame, success: Success) -> pd.DataFrame:
 def published(path: Path) -> pd.DataFrame:
     """Published total errors by joint; raises DataError unless they are percentages."""
     table = read_csv(path, ("joint", *PUBLISHED_NETWORKS), keys=("joint",)).set_index("joint")
-    for name, (joint, value) in (
-        (n, item) for n in PUBLISHED_NETWORKS for item in table[n].items()
-    ):
-        if value < 0.0 or value > 100.0:
-            raise DataError(f"{path}: {name}, joint {joint}: expected 0 to 100 %, got {value}")
+    for name in PUBLISHED_NETWORKS:
+        for joint, value in table[name].items():
+            if value < 0.0 or value > 100.0:
+                raise DataError(f"{path}: {name}, joint {joint}: expected 0 to 100 %, got {value}")
     return table
 
 
@@ -237,11 +230,8 @@ def query_settings(section: Section) -> str:
 
 def growth_settings(section: Section) -> str:
     """Checksum of what networks of other sizes and passes share with whole_workspace."""
-    network = section.networks["whole_workspace"]
-    parts = (
-        *(section.machine, section.conditions.random_poses, section.conditions.refinement),
-        *(section.success, section.trainers[network.trainer].but(n_iterations=1)),
-    )
-    samples = section.samples.n_poses, section.samples.seed
-    settings = [*(part.model_dump() for part in parts), *samples]
-    return digest([*settings, network.activation, network.seed])
+    network, given, samples = section.networks[WHOLE], section.conditions, section.samples
+    trainer = section.trainers[network.trainer].but(n_iterations=1)
+    parts = (section.machine, given.random_poses, given.refinement, section.success, trainer)
+    numbers = (samples.n_poses, samples.seed, network.activation, network.seed)
+    return digest([*(part.model_dump() for part in parts), *numbers])
