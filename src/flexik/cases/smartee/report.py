@@ -150,15 +150,15 @@ def direct_kinematics(results: Results) -> pd.DataFrame:
     for name, method in section.methods.items():
         for n_steps in method.n_steps[name == "centre" :]:
             key = ("centre" if name == "previous" else name, n_steps)
-            batched = np.nan if name == "previous" else times["microseconds_batched"].get(key)
+            batched = times["microseconds_batched"].get(key, np.nan)
             peaks = {p: results.peak(name, n_steps, p) for p in ("validation", "random", *paths)}
             rows.append(
                 {
                     "start": method.start,
                     "Newton steps": str(n_steps) if method.tolerance is None else "until converged",
                     **{conditions: scientific(peak) for conditions, peak in peaks.items()},
-                    "single (us)": times["microseconds_single"].get(key),
-                    "batched (us)": batched,
+                    "single (us)": times["microseconds_single"].get(key, np.nan),
+                    "batched (us)": np.nan if name == "previous" else batched,
                 }
             )
     return pd.DataFrame(rows)
