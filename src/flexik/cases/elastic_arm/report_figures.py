@@ -19,6 +19,7 @@ PAIRS = {
     **{name: Axis(f"{name} (deg)", DEGREES) for name in ANGLES},
     **{name: Axis(f"{name} (m)") for name in ("p_x", "p_y")},
 }
+LOOKS = {"training and selection": {"color": style.SKY}, "held out": {"color": style.VERMILION}}
 
 
 def figures(results: Results) -> dict[str, Drawing]:
@@ -105,10 +106,7 @@ def target_and_network(results: Results, name: str) -> Drawing:
         chart,
         Layer(line, "target", "network", look={"color": style.INK, "linewidth": 0.8}),
         Layer(every, "target", "network", "o", "part", look={"markersize": 3.2}),
-        looks={
-            "training and selection": {"color": style.SKY},
-            "held out": {"color": style.VERMILION},
-        },
+        looks=LOOKS,
         x={k: Axis(f"target {axis.label}", axis.scale) for k, axis in PAIRS.items()},
         y={k: Axis(f"network {axis.label}", axis.scale) for k, axis in PAIRS.items()},
         titles=titles,

@@ -37,12 +37,11 @@ N_BINS = 20  # of the extent
 
 def figures(results: Results) -> dict[str, Drawing]:
     """Figures by name."""
-    looks = style.looks(results.section.methods)
     given = results.section.studies.starts
     sizes, published = results.section.studies.sizes.poses, results.section.networks[PUBLISHED]
     return {
         "mechanism": mechanism(results),
-        **{f"{quantity}_errors": pose_errors(results, quantity, looks) for quantity in QUANTITIES},
+        **{f"{quantity}_errors": pose_errors(results, quantity) for quantity in QUANTITIES},
         "starts": draw(
             kinds.distribution,
             *(results.starts[["trainer", "spread", "error"]], "error", "trainer"),
@@ -51,7 +50,6 @@ def figures(results: Results) -> dict[str, Drawing]:
             panel="spread",
             of_all=True,
             titles={spread: f"starts {spread}" for spread in given.spreads},
-            looks=style.looks(given.trainers),
             rules=[Rule("x", given.success, "success")],
             share="xy",
             columns=2,
@@ -69,18 +67,16 @@ def figures(results: Results) -> dict[str, Drawing]:
     }
 
 
-def pose_errors(results: Results, quantity: str, looks: dict) -> Drawing:
+def pose_errors(results: Results, quantity: str) -> Drawing:
     """Errors over the validation poses, a line a network, and the published peak."""
     frame = pd.concat(results.groups[name, 0, VALIDATION] for name in GOALS)
     frame = frame.assign(number=frame["point"] + 1)[["number", "method", QUANTITIES[quantity]]]
-    peak = Rule("y", MM * results.published[quantity], "published peak")
     return draw(
         chart,
         Layer(frame, "number", QUANTITIES[quantity], "-", "method", look={"linewidth": 1.0}),
         x=Axis("validation pose", integer=True),
         y=Axis(LABELS[quantity], MM, limits=(0.0, None)),
-        looks=looks,
-        rules=[peak],
+        rules=[Rule("y", MM * results.published[quantity], "published peak")],
         height=3.6,
     )
 
@@ -125,7 +121,6 @@ def outside(results: Results) -> Drawing:
         Layer(frame, "extent", "max", ":", hue="method", label="{}, peak"),
         x=Axis("extent of the pose (1: the edge of the box)", limits=(0.0, largest)),
         y=Axis("elbow error (rad)", log=True, least=LEAST),
-        looks={name: {"color": c} for name, c in zip(tables, style.COLOURS, strict=False)},
         rules=[Rule("x", 1.0, look={"color": style.GREY, "linestyle": "--", "linewidth": 1.0})],
         height=4.6,
     )
