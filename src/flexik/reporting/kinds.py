@@ -98,10 +98,9 @@ def beside(
         x = wide.get(None, wide)
     ticks = {k: str(name) for name, k in categories.items()}
     y = Axis(ticks=ticks, limits=(len(ticks) - 0.45, -0.55))
-    defaults: dict[str, Any] = {"share": "y"}
-    defaults["height"] = 1.3 + (0.6 if numbers else 0.42) * len(ticks)
+    options = {"share": "y", "height": 1.3 + (0.6 if numbers else 0.42) * len(ticks), **options}
     shown = [layer for layer in layers if len(layer.frame)]
-    return chart(*shown, x=x, y=y, panel=panel, **defaults | options)
+    return chart(*shown, x=x, y=y, panel=panel, **options)
 
 
 def distribution(
@@ -142,8 +141,8 @@ def distribution(
         text = " and ".join(f"{100 * q:g} %" for q in MARKED)
         options.setdefault("legend", f"value at {text} of the {what} (circle, diamond)")
     y = Axis(f"{what} with at most this error (%)", limits=(0, 101.5), ticks=(0, 25, 50, 75, 99))
-    defaults: dict[str, Any] = {"height": 5.2, "share": "y"}
-    return chart(*layers, *marks, x=x, y=y, panel=panel, **defaults | options)
+    options = {"height": 5.2, "share": "y", **options}
+    return chart(*layers, *marks, x=x, y=y, panel=panel, **options)
 
 
 def _three(value: float) -> str:

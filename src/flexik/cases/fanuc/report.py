@@ -70,12 +70,8 @@ def report(section: Section) -> None:
 
 def tables(results: Results) -> dict[str, Table]:
     """All tables."""
-    joints = [
-        {"joint": k, **j.model_dump()} for k, j in enumerate(results.section.machine.joints, 1)
-    ]
-    on_path, at_random = (
-        results.statistics[where].reset_index() for where in ("path", "random_poses")
-    )
+    joints = pd.DataFrame([joint.model_dump() for joint in results.section.machine.joints])
+    on_path, at_random = (results.statistics[k].reset_index() for k in ("path", "random_poses"))
     starts = results.start_shifts.groupby("method").agg(["min", "max"])
     spreads = {n: f"{MM * least:.3g} to {MM * most:.3g}" for n, least, most in starts.itertuples()}
     on_path["starts"] = on_path["label"].map(spreads).fillna("")
@@ -84,7 +80,7 @@ def tables(results: Results) -> dict[str, Table]:
     timed = at_random.merge(times, on="label", how="outer").set_index("label").loc[list(names)]
     of_all = {**POSITION, "median position (mm)": mm("median", 3), **REST, **TIMES}
     return {
-        "joints": table(joints, JOINT_COLUMNS),
+        "joints": table(joints.assign(joint=JOINTS), JOINT_COLUMNS),
         "total_errors": total_errors(results),
         "passes": passes(results),
         "path_errors": table(on_path, {**POSITION, "all starts (mm)": "starts", **REST}),
