@@ -97,22 +97,14 @@ def tables(results: Results) -> dict[str, Table]:
         "max tip error (mm)": mm("max_error"),
         "mean tip error by restart (mm)": "mean_errors",
     }
-    networks = results.section.data / "networks"
-    training = pd.concat(
-        pd.read_csv(networks / f"{name}.restarts.csv").assign(
-            network=name, hidden=results.hidden(name)
-        )
-        for name in results.section.networks
-    )
-    front = ["network", "hidden", "restart"]
-    training = training[[*front, *training.columns.difference(front, sort=False)]]
+    folder, networks = results.section.data / "networks", results.section.networks
+    runs = {(n, results.hidden(n)): pd.read_csv(folder / f"{n}.restarts.csv") for n in networks}
+    training = pd.concat(runs, names=["network", "hidden"]).reset_index(["network", "hidden"])
     off, changes = MM * sensitivity(results), results.of("studies/sensitivity").groupby("input")
     off.insert(0, "off by (um, urad)", MICRO * changes["change"].first())
     return {
         "sensitivity": Table(off.rename_axis("input that is off").reset_index(), 3),
-        "positioning_errors": table(
-            results.positioning.rename_axis("method").reset_index(), POSITIONING
-        ),
+        "positioning_errors": table(results.positioning.reset_index(), POSITIONING),
         "fit": table(results.fits.reset_index(), fit_columns),
         "splits": splits_table(results),
         "gauges": gauges_table(results),

@@ -144,7 +144,8 @@ class Results:
                 row["worst_max_error"] = restarts["max_error"].max()
             rows[label] = row
         told = self.of("studies/payload_error").set_index("method")["mean_error"]
-        return pd.DataFrame.from_dict(rows, orient="index").assign(told=told)
+        found = pd.DataFrame.from_dict(rows, orient="index").assign(told=told)
+        return found.rename_axis("method")
 
     @property
     def splits(self) -> pd.DataFrame:
