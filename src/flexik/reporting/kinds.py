@@ -131,7 +131,7 @@ def distribution(
         curve, label = curve.assign(**named), str(names[0])
         if isinstance(x, Axis) and not panel:
             found = {q: int(np.searchsorted(share, 100 * q - 1e-9)) for q in MARKED}
-            label += f": {', '.join(_three(x.scale * values[k]) for k in found.values())}"
+            label += f": {', '.join(style.digits(x.scale * values[k]) for k in found.values())}"
             for q, k in found.items():
                 look = {"marker": MARKED[q], "markersize": 5.5}
                 mark = curve.iloc[[k + 1]]
@@ -143,10 +143,6 @@ def distribution(
     y = Axis(f"{what} with at most this error (%)", limits=(0, 101.5), ticks=(0, 25, 50, 75, 99))
     options = {"height": 5.2, "share": "y", **options}
     return chart(*layers, *marks, x=x, y=y, panel=panel, **options)
-
-
-def _three(value: float) -> str:
-    return np.format_float_positional(value, 3, fractional=False, trim="-")
 
 
 def sizes(

@@ -14,7 +14,6 @@ from typing import Any
 from urllib.parse import quote
 
 import jinja2
-import numpy as np
 
 from flexik.errors import DataError
 from flexik.reporting import style
@@ -45,9 +44,7 @@ FILTERS: dict[str, Callable[..., Any]] = {
     "percent": lambda value, decimals=0: f"{100 * value:.{decimals}f} %",
     "fixed": lambda value, decimals=2: f"{value:.{decimals}f}",
     "short": lambda value: f"{value:g}",  # 470.0 -> "470"
-    "digits": lambda value, n=3: np.format_float_positional(
-        float(value), n, fractional=False, trim="-"
-    ),
+    "digits": style.digits,
     "point": lambda point: style.coordinates(*point),  # (1, -2) -> "(1, −2)"
     "code": lambda name: f"`{name}`",
     "words": lambda name: str(name).replace("_", " "),

@@ -110,6 +110,11 @@ def signed(value: float) -> str:
     return f"{value + 0.0:g}".replace("-", "\N{MINUS SIGN}")
 
 
+def digits(value: float, n: int = 3) -> str:
+    """Decimal form of `n` significant digits, without zeros at the end."""
+    return np.format_float_positional(float(value), n, fractional=False, trim="-")
+
+
 def coordinates(*point: float) -> str:
     """Name of a point: its coordinates in m."""
     return f"({', '.join(signed(value) for value in point)})"
