@@ -233,9 +233,9 @@ def metrics(results: Results) -> dict[str, float | None]:
     for name, (prefix, conditions), (quantity, column) in kinds:
         unit, factor = UNITS[quantity]
         key = f"{name}.{prefix}peak_{quantity}_{unit}"
-        spread = factor * results.over_restarts(name, conditions, column)
+        peaks = factor * results.over_restarts(name, conditions, column)
         found[key] = factor * results.peak(name, 0, conditions, column)
-        found |= {f"{key}_median": spread.median(), f"{key}_largest": spread.max()}
+        found |= {f"{key}_median": peaks.median(), f"{key}_largest": peaks.max()}
     for row in draws(results).query("error == 'all three'").to_dict("records"):
         found[f"{row['network']}.draws_share"] = 0.01 * row["meets (%)"]
     for n_steps in range(1, STEPS + 1):
@@ -302,13 +302,8 @@ def _goal(results: Results, name: str, margin: float) -> dict[str, Any]:
 
     n_met : restarts, of n_restarts, that miss none.
     """
-    ratios = pd.DataFrame(
-        {
-            quantity: results.over_restarts(name, "validation", column)
-            / results.published[quantity]
-            for quantity, column in QUANTITIES.items()
-        }
-    )
+    peaks = {q: results.over_restarts(name, "validation", c) for q, c in QUANTITIES.items()}
+    ratios = pd.DataFrame(peaks) / [results.published[quantity] for quantity in QUANTITIES]
     found: dict[str, dict] = {"chosen": _ratios(results, name, "validation")}
     found["median"] = ratios.median().to_dict()
     return {
