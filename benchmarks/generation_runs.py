@@ -24,7 +24,7 @@ import pandas as pd
 from exudyn.processing import ParameterVariation
 
 from flexik.cases.case import load
-from flexik.cases.crane.parts.crane import flexible, model_inputs
+from flexik.cases.crane.parts.crane import FlexibleCrane, flexible, model_inputs
 from flexik.cases.crane.parts.fields import SAMPLE_FIELDS
 from flexik.cases.crane.parts.samples import GridParts, axis, counts, parts
 from flexik.cases.crane.section import Grid
@@ -34,8 +34,7 @@ from flexik.datasets.tables import read_table
 from flexik.errors import SolverError
 from flexik.kinematics.crane import forward
 from flexik.kinematics.manipulator import Array
-from flexik.multibody.crane.model import CraneModel
-from flexik.multibody.crane.structure import FlexibleCrane
+from flexik.multibody.model import PlanarModel
 
 # Values on the axes: 4050 vectors as in table 4.1, ten times and 100 times as many
 SMALL = {"lift": 9, "jib": 9, "extension": 5, "payload": 10}
@@ -63,7 +62,7 @@ def grid(n_values: Mapping[str, int]) -> Grid:
 def generated(asked: Grid, n_processes: int) -> pd.DataFrame:
     """Table of the pipeline's part `grid` for the grid `asked`, written and read back."""
     part = next(part for part in parts(load("crane")) if part.name == "grid")
-    part = Part(part.name, part.prepare, {**part.settings, "grid": asked}, part.inputs)
+    part = Part(part.name, part.prepare, {**part.settings, "drawn": asked}, part.inputs)
     with (
         tempfile.TemporaryDirectory() as folder,
         # processes also where the work is too small for their start
@@ -97,9 +96,8 @@ def one_model_per_vector(parameter_set: dict[str, Any]) -> tuple[float, float]:
     strokes = np.array([parameter_set[name] for name in ("lift", "jib", "extension")])
     if forward(model().geometry, strokes[None])[0, 0] < load("crane").samples.minimum_tip_x:
         return np.nan, np.nan
-    system = CraneModel(model(), float(strokes[2]))
     try:
-        system.place(strokes)
+        system = PlanarModel.placed(model(), strokes)
         system.solve(parameter_set["payload"])
     except SolverError:
         return np.nan, np.nan

@@ -52,7 +52,7 @@ class Case:
 def cases() -> dict[str, Case]:
     """All methods by name; raises DataError naming what `make repro` has to make."""
     section = load("crane")
-    manipulator = CraneManipulator(section.machine.geometry)
+    manipulator = CraneManipulator(section.geometry)
     try:
         table = read_table(section.data / "samples/workspace.parquet", TARGET_FIELDS)
         methods = {name: method_of(section, name) for name in section.methods}

@@ -37,7 +37,7 @@ def crane_lesson(network: str) -> Lesson:
     Raises DataError when the pipeline has not made them.
     """
     section = load("crane")
-    geometry = section.machine.geometry
+    geometry = section.geometry
     architecture = Architecture(1, ACTIVATION)
     return lesson(NETWORKS[network], architecture, OURS(), SEED, geometry, **data_inputs(section))
 

@@ -8,10 +8,8 @@ from flexik.machines.planar import PlanarMachine, read_machine
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "data/machines"
-FILES = {name: FOLDER / f"{name}.yaml" for name in ("concrete_pump", "elastic_arm", "excavator")}
-# the crane of the pipeline has a file of its own kind
-FILES["crane"] = FOLDER / "planar/crane.yaml"
-NAMES = sorted(FILES)
+NAMES = ["concrete_pump", "crane", "elastic_arm", "excavator"]
+FILES = {name: FOLDER / f"{name}.yaml" for name in NAMES}
 
 
 @functools.cache

@@ -39,7 +39,7 @@ from flexik.datasets.tables import read_table
 from flexik.errors import FlexikError, ParameterError, SolverError
 from flexik.files import write_json
 from flexik.kinematics.crane import forward
-from flexik.multibody.crane.model import tips
+from flexik.multibody.planar import tips
 
 
 @pytest.fixture(scope="module")
@@ -267,7 +267,7 @@ def test_tables_do_not_depend_on_the_workers(project, monkeypatch):
         assert table[name].between(least, most).all()
     assert (table["target_x"] >= section.samples.minimum_tip_x).all()
     strokes = table[["lift_stroke", "jib_stroke", "extension_stroke"]].to_numpy()
-    assert (strokes >= 0).all() and (strokes <= section.machine.geometry.stroke_maximum).all()
+    assert (strokes >= 0).all() and (strokes <= section.geometry.stroke_maximum).all()
     tip = tips(crane_case.crane(), strokes, table["payload"].to_numpy())
     off = np.linalg.norm(tip - table[["target_x", "target_y"]].to_numpy(), axis=1)
     assert (off < 1.01 * random.tolerance).all()

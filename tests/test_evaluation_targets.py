@@ -19,7 +19,7 @@ from flexik.kinematics.crane import forward
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.manipulator import RigidSolution
 from flexik.kinematics.status import ACTUATOR_LIMIT
-from flexik.multibody.crane.model import solve, tips
+from flexik.multibody.planar import solve, tips
 from flexik.positioning.method import PositioningError
 
 LOWER, UPPER, PAYLOAD = (0.0, -4.5), (6.5, 8.0), (30.0, 500.0)

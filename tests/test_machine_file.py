@@ -10,12 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from planar_machines import FILES, NAMES, ROOT, general
 
-from flexik.cases.case import load
 from flexik.errors import ParameterError
 from flexik.kinematics.machine_file import read_manipulator
 from flexik.machines.bodies import Beam
 from flexik.machines.planar import PlanarMachine, read_machine
-from flexik.machines.sections import Box, Solid, Table, Tube
+from flexik.machines.sections import Box, Solid, Tube
 from flexik.parameters.reading import read_yaml
 
 each_machine = pytest.mark.parametrize("name", NAMES)
@@ -41,23 +40,6 @@ def test_shipped_files_are_read_and_move(name):
     machine, manipulator = read_manipulator(FILES[name])
     assert len(machine.beams) >= 2
     assert len(manipulator.lower) == len(machine.drives)
-
-
-def test_crane_has_the_structure_of_its_case():
-    machine, given = general("crane").machine, load("crane", ROOT / "params.yaml").machine.structure
-    assert machine.gravity == given.gravity and machine.element == given.element
-    for name, beam in machine.beams.items():
-        known = getattr(given.beams, name)
-        assert isinstance(beam.section, Table) and beam.section.file == known.section
-        assert beam.youngs_modulus == given.youngs_modulus and beam.mass == known.mass
-        assert beam.span == pytest.approx(known.span, abs=1e-12)
-        assert (beam.mass_span or beam.span) == pytest.approx(known.mass_span, abs=1e-12)
-        along, left = beam.foot(beam.centre)
-        assert (along, left) == pytest.approx((known.centre_of_mass, known.mass_offset), abs=1e-12)
-        assert beam.n_elements == known.n_elements
-    for name in ("rocker", "coupler"):
-        known, body = getattr(given, name), machine.bodies[name]
-        assert (body.mass, body.centre) == (known.mass, (known.centre_of_mass, 0.0))
 
 
 def test_closed_forms_of_sections():
@@ -102,10 +84,10 @@ def test_a_tapered_beam_weighs_most_at_its_thick_end():
 
 
 def test_masses_of_the_crane_add_up():
-    masses = general("crane").machine.masses()
+    masses = {key: mass for key, (_, _, mass) in general("crane").machine.masses().items()}
     assert sum(masses.values()) == pytest.approx(93.26 + 124.6 + 76.6 + 58.6 + 11.52 + 7.9)
-    assert general("elastic_arm").machine.masses()["bodies.link_1.masses.joint_2"] == 0.5
-    assert general("excavator").machine.masses()["drives.boom.masses.1"] == 90.0
+    assert general("elastic_arm").machine.masses()["bodies.link_1.masses.joint_2"][-1] == 0.5
+    assert general("excavator").machine.masses()["drives.boom.masses.1"][-1] == 90.0
 
 
 def test_free_constants_are_named_and_given():

@@ -78,22 +78,21 @@ def test_profiles_are_valid(original, path, monkeypatch):
         cases.check(section)
 
 
-GRID, BEAMS = "crane.samples.grid", "crane.machine.structure.beams"
+GRID, BEAMS = "crane.samples.grid", "crane.machine.bodies"
 DEFLECTION, SELECTED = "crane.networks.deflection", "crane.networks.deflection_selected"
 MODULAR, INVERSION = "crane.networks.modular", "crane.methods.direct.inversion"
 MEASURED = "crane.studies.measured"
 WRONG = [
     # value out of range
     (f"{BEAMS}.lift.mass", -124.6),
-    (f"{BEAMS}.lift.mass", 0.0),
-    ("crane.machine.structure.rocker.mass", -1.0),
-    ("crane.machine.structure.youngs_modulus", 0.0),
+    (f"{BEAMS}.rocker.mass", -1.0),
+    (f"{BEAMS}.lift.youngs_modulus", 0.0),
     (f"{BEAMS}.jib.n_elements", 0),
     (f"{BEAMS}.jib.n_elements", 2.5),
     (f"{BEAMS}.jib.mass_span", [-1.0, 1.8]),
-    (f"{BEAMS}.jib.centre_of_mass", 3.0),
-    ("crane.machine.geometry.rocker_length", -0.45),
-    ("crane.machine.geometry.stroke_maximum.1", 0.0),
+    (f"{BEAMS}.jib.centre", [3.0, 0.2]),
+    ("crane.machine.drives.jib.retracted", -0.45),
+    ("crane.machine.drives.jib.limits", [0.0, 0.0]),
     ("crane.calibration.stiffness_range", [1.0e9, 1.0e6]),
     ("crane.calibration.stiffness", 0.0),
     ("crane.studies.mesh.refinements", [1]),
@@ -134,7 +133,7 @@ WRONG = [
     ("crane.methods.combined_ga.genetic.n_current", 16),
     ("parallel.n_workers", -1),
     # names that nothing goes by
-    ("crane.machine.structure.element", "timoshenko"),
+    ("crane.machine.element", "timoshenko"),
     (f"{DEFLECTION}.activation", "relu"),
     (f"{DEFLECTION}.learns", "correction"),
     (f"{DEFLECTION}.trainer", "nothing"),
@@ -164,9 +163,9 @@ WRONG = [
     ("crane.studies.tolerance.methods.1", "direct"),
     (INVERSION, None),
     ("crane.methods.direct", 3),
-    ("crane.machine.geometry.lift_pivot", [1.0]),
-    ("crane.machine.geometry.lift_pivot", [1.0, 2.0, 3.0]),
-    ("crane.machine.structure.gravity", None),
+    (f"{BEAMS}.lift.points.jib_pivot", [1.0]),
+    (f"{BEAMS}.lift.points.jib_pivot", [1.0, 2.0, 3.0]),
+    ("crane.machine.gravity", None),
     (f"{GRID}.lift", [0.0, 0.5]),
     ("crane.conditions.published.points.3", [1.0, 7.0]),
     # no numbers
@@ -174,9 +173,9 @@ WRONG = [
     (f"{INVERSION}.tolerance", "1e-7"),
     ("crane.studies.tolerance.tolerances.0", "1e-5"),
     ("crane.calibration.stiffness_range", ["1e6", 1.0e9]),
-    ("crane.machine.structure.gravity", "nan"),
-    ("crane.machine.structure.gravity", float("nan")),
-    ("crane.machine.structure.gravity", True),
+    ("crane.machine.gravity", "nan"),
+    ("crane.machine.gravity", float("nan")),
+    ("crane.machine.gravity", True),
     ("crane.conditions.published.points.0.1", float("inf")),
     ("crane.conditions.published.points.0", ["1e-3", 1.0]),
     ("crane.studies.mesh.n_samples", True),
@@ -189,18 +188,17 @@ WRONG = [
     ("robot", {}),
     ("cases", {"crane": {"code": "robot"}}),
     ("cases", {"My own": {"code": "crane"}}),
-    ("crane.machine.structure.gravity", ...),
-    (f"{BEAMS}.pillar", ...),
+    ("crane.machine.gravity", ...),
+    (f"{BEAMS}.pillar.axis", ...),
     ("trainers.study.kind", ...),
     (f"{DEFLECTION}.n_hidden", ...),
     # what no single value tells
     ("crane.conditions.published.points.1", [9.0, 9.0]),
     ("crane.conditions.workspace.x", [50.0, 60.0]),
-    ("crane.machine.geometry.jib_cylinder_length", 0.2),
-    ("crane.machine.geometry.stroke_maximum", [0.535, 1.5, 1.6]),
-    (f"{BEAMS}.lift.span", [0.0, 2.9]),
-    (f"{BEAMS}.jib.section", "data/nosuch.csv"),
-    ("crane.machine.structure.rocker.centre_of_mass", 5.0),
+    ("crane.machine.kinematics", "general"),
+    ("crane.machine.joints.slew.springs.torsion", 8.0e6),
+    ("crane.machine.drives.jib.limits", [0.0, 0.95]),
+    (f"{BEAMS}.jib.section.file", "data/nosuch.csv"),
     # the other cases
     ("elastic_arm.networks.published_network.n_hidden", [15, 0]),
     ("elastic_arm.networks.published_network.learns", "strains"),

@@ -6,15 +6,21 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planar_machines import FILES, NAMES, ROOT, four_bar, general, machine, pin, rigid, serial
+from planar_machines import FILES, NAMES, four_bar, general, machine, pin, rigid, serial
+from virtual_work import GEOMETRY
 
-from flexik.cases.case import load
 from flexik.errors import ParameterError
 from flexik.kinematics import crane
+from flexik.kinematics.crane_dimensions import DIMENSIONS, corrected
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.elastic_arm import ArmGeometry
 from flexik.kinematics.loops import Linkage
-from flexik.kinematics.machine_file import crane_geometry, manipulator_of, read_manipulator
+from flexik.kinematics.machine_file import (
+    crane_geometry,
+    manipulator_of,
+    read_manipulator,
+    with_geometry,
+)
 from flexik.kinematics.planar import PlanarManipulator
 from flexik.kinematics.status import ACTUATOR_LIMIT, OUT_OF_REACH, REACHED
 from flexik.machines.planar import PlanarMachine
@@ -41,11 +47,24 @@ def test_agrees_with_the_closed_form(name):
     assert np.abs(general(name).forward(values) - closed.forward(values)).max() < 1e-9
 
 
-def test_file_of_the_crane_says_the_same_as_that_of_its_case():
+def test_file_of_the_crane_has_the_dimensions_of_the_source():
     found = crane_geometry(general("crane").machine)
-    given = load("crane", ROOT / "params.yaml").machine.geometry
-    for name in type(given).model_fields:
-        assert getattr(found, name) == pytest.approx(getattr(given, name), abs=1e-15), name
+    for name, expected in vars(GEOMETRY).items():
+        assert getattr(found, name) == pytest.approx(expected, abs=1e-15), name
+
+
+def test_a_crane_of_other_dimensions_moves_as_its_closed_form():
+    machine = general("crane").machine
+    other = corrected(GEOMETRY, np.random.default_rng(4).normal(0.0, 3e-3, len(DIMENSIONS)))
+    changed = with_geometry(machine, other)
+    assert crane_geometry(changed) == other
+    near = Linkage(changed, near=general("crane").linkage)
+    values = drawn(near, 200)
+    number, (x, y) = near.names.index("extension"), machine.located("extension.tip").point
+    pose = near.poses(values)[:, number]
+    tip = pose[:, :2] + crane.rotate(pose[:, 2], np.array([x, y]))
+    assert tip == pytest.approx(crane.forward(other, values), abs=1e-9)
+    assert near.poses(values) == pytest.approx(Linkage(changed).poses(values), abs=1e-9)
 
 
 @each_machine

@@ -1,16 +1,14 @@
-"""Statics of machines of a file against beam theory, and against the crane's own model."""
+"""Statics of machines of a file against beam theory."""
 
 import numpy as np
 import pytest
 from planar_machines import FILES, ROOT, machine, pin, rigid
+from pydantic import ValidationError
 from scipy.integrate import quad
 
-from flexik.cases.case import load
 from flexik.errors import ParameterError, SolverError
 from flexik.kinematics.planar import PlanarManipulator
 from flexik.machines.planar import read_machine
-from flexik.multibody.crane.assembly import flexible_crane
-from flexik.multibody.crane.model import tips as tips_of_crane
 from flexik.multibody.flexible import FlexibleMachine
 from flexik.multibody.planar import solve, tips
 
@@ -110,6 +108,55 @@ def test_a_soft_ground(springs):
     assert sag(given) == pytest.approx(np.array([0.5 * turned, -2 * turned - sunk]), rel=2e-2)
 
 
+@pytest.mark.parametrize(
+    ("springs", "sunk"), [({"x": 1e5}, 1e-5), ({"y": 1e5}, 0.0), ({"x": 1e5, "y": 3e5}, 1e-5)]
+)
+def test_springs_have_the_axes_of_the_inner_body(springs, sunk):
+    # which the drive turns until its x is up
+    given = machine(
+        {"a": [0, 0]},
+        {"arm": rigid(a=[0, 0], b=[1, 0]), "end": rigid(b=[0, 0], tip=[0.5, 0])},
+        {"a": pin("ground.a", "arm.a"), "b": {"kind": "fixed", "of": ["arm.b", "end.b"]}},
+        {"turn": turning("a", (0.0, 2.0))},
+        "end.tip",
+    )
+    soft = given.with_constants({"joints.b.springs": springs})
+    found = sag(soft, values=np.array([np.pi / 2]))
+    assert found == pytest.approx(np.array([0.0, -10 * G * sunk]), rel=1e-6, abs=1e-9)
+
+
+def extended(inner, outer):
+    """A boom of two bodies that slide."""
+    out = {"kind": "telescope", "joint": "pads", "of": ["boom.front", "slider.tip"]}
+    return machine(
+        {"a": [0, 0]},
+        {"boom": inner, "slider": outer},
+        {
+            "a": pin("ground.a", "boom.a"),
+            "pads": {"kind": "slide", "of": ["boom.front", "slider.rear"]},
+        },
+        {"turn": turning("a"), "out": {**out, "limits": [0.2, 1.0]}},
+        "slider.tip",
+    )
+
+
+STIFF = {"kind": "box", "width": 0.3, "height": 0.6, "wall": 0.05}
+
+
+@pytest.mark.parametrize("inner_bends", [False, True])
+@pytest.mark.parametrize("outer_bends", [False, True])
+def test_pads_move_on_bodies_of_every_kind(inner_bends, outer_bends):
+    boom, slider = {"a": [0, 0], "front": [2, 0]}, {"rear": [0, 0], "tip": [1.5, 0]}
+    given = extended(
+        beam([[0, 0], [2, 0]], STIFF, **boom) if inner_bends else rigid(**boom),
+        beam([[0, 0], [1.5, 0]], STIFF, **slider) if outer_bends else rigid(**slider),
+    )
+    values = np.array([[0.0, 0.2], [0.5, 0.7], [-0.3, 1.0]])
+    expected = PlanarManipulator(given).forward(values)
+    found = tips(FlexibleMachine(given), values, np.full(3, 0.01))
+    assert found == pytest.approx(expected, abs=1e-4 if inner_bends or outer_bends else 1e-8)
+
+
 def test_a_four_bar_with_a_flexible_coupler():
     middle = [1.0, 0.0]
     given = machine(
@@ -140,26 +187,9 @@ def below(x, y):
 
 @pytest.mark.parametrize("out", [0.4, 0.9])
 def test_a_telescope_on_two_pads(out):
-    given = machine(
-        {"a": [0, 0]},
-        {
-            "boom": beam([[0, 0], [2, 0]], a=[0, 0], front=[2, 0]),
-            "slider": beam([[0, 0], [1.5, 0]], rear=[0, 0], tip=[1.5, 0]),
-        },
-        {
-            "a": pin("ground.a", "boom.a"),
-            "pads": {"kind": "slide", "of": ["boom.front", "slider.rear"]},
-        },
-        {
-            "turn": turning("a"),
-            "out": {
-                "kind": "telescope",
-                "joint": "pads",
-                "of": ["boom.front", "slider.tip"],
-                "limits": [0.2, 1.0],
-            },
-        },
-        "slider.tip",
+    given = extended(
+        beam([[0, 0], [2, 0]], a=[0, 0], front=[2, 0]),
+        beam([[0, 0], [1.5, 0]], rear=[0, 0], tip=[1.5, 0]),
     )
     inside = 1.5 - out
     front, rear = (out + inside) / inside, -out / inside  # forces on the boom, of the payload
@@ -194,15 +224,6 @@ def _here(monkeypatch):
     monkeypatch.chdir(ROOT)
 
 
-def test_crane_is_that_of_its_own_model():
-    general = shipped("crane")
-    values, payload = drawn(general, 200, 500.0)
-    own = flexible_crane(load("crane").machine, SPRING)
-    assert tips(general, values, payload) == pytest.approx(
-        tips_of_crane(own, values, payload), abs=1e-6
-    )
-
-
 @pytest.mark.parametrize(
     ("name", "payload", "largest"),
     [("crane", 500.0, 2e-3), ("excavator", 3000.0, 1e-4), ("concrete_pump", 300.0, 2e-3)],
@@ -229,6 +250,11 @@ def test_rows_do_not_depend_on_each_other():
     values, payload = drawn(flexible, 12, 500.0)
     alone = [tips(flexible, values[[k]], payload[[k]])[0] for k in range(12)]
     assert tips(flexible, values, payload) == pytest.approx(np.array(alone), abs=1e-7)
+
+
+def test_corners_that_would_share_a_node_are_refused():
+    with pytest.raises(ValidationError, match=r"axis: expected corners 0\.03 m apart or more"):
+        clamped(beam([[0, 0], [1, 0], [1.02, 0], [1.02, 1]], a=[0, 0], tip=[1.02, 1]))
 
 
 def test_a_failure_is_a_row_that_names_its_coordinates():

@@ -1,5 +1,7 @@
 """Initial positions and the closed-form rigid inverse."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -29,7 +31,7 @@ def test_initial_positions_are_full_centimetres_near_the_inverse(geometry, point
 
 
 def test_initial_positions_stay_within_a_limit_between_two_centimetres(geometry):
-    longer = geometry.model_copy(update={"stroke_maximum": (0.538, 0.78, 1.6)})
+    longer = replace(geometry, stroke_maximum=(0.538, 0.78, 1.6))
     at_limit = crane.forward(longer, np.array([[0.537, 0.3, 0.0]]))
     assert CraneManipulator(longer).initial_positions(at_limit)[0] == pytest.approx(
         [0.53, 0.3, 0.0], abs=1e-12

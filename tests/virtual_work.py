@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import fsolve
 
-from flexik.kinematics.crane import pose
-from flexik.machines.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry, pose
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float]
@@ -30,13 +29,13 @@ H_ROWS = slice(12, 14)
 # Of the source, not of the machine file
 GEOMETRY = CraneGeometry(
     lift_pivot=(-0.09, 1.115),
-    lift_cylinder_base=(0.26, -1.04),
+    lift_cylinder_base=(-0.09 + 0.26, 1.115 - 1.04),
     lift_cylinder_head=(0.3025, -0.105),
     jib_pivot=(2.88, -0.024),
-    rocker_pivot=(-0.19, -0.015),
-    jib_cylinder_base=(-1.4165, 0.203),
+    rocker_pivot=(2.88 - 0.19, -0.024 - 0.015),
+    jib_cylinder_base=(2.88 - 0.19 - 1.4165, -0.024 - 0.015 + 0.203),
     coupler_pin=(-0.095, 0.24),
-    extension_start=(2.141, 0.008),
+    extension_start=(-0.095 + 2.141, 0.24 + 0.008),
     lift_cylinder_length=0.8,
     jib_cylinder_length=1.037,
     rocker_length=0.45,

@@ -8,6 +8,7 @@ flexible model puts its pins at the same points. The tips differ from the code's
 (0.2 mm for jib strokes up to 0.58 m).
 """
 
+from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
@@ -15,11 +16,37 @@ import numpy as np
 
 from flexik.errors import ParameterError
 from flexik.kinematics.manipulator import Array, RigidSolution, arc_cosine, limited
-from flexik.machines.crane import CraneGeometry
-from flexik.parameters.model import Vector
 
+Vector = tuple[float, float]
 # A stroke this far outside its limits is round-off of a target on the border, m
 STROKE_TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True)
+class CraneGeometry:
+    """Dimensions in m. Frames: `ground`; `lift` (origin B, x along the arm); `jib` (origin G).
+
+    lift_pivot, lift_cylinder_base : B and C in the ground frame.
+    lift_cylinder_head, jib_pivot, rocker_pivot, jib_cylinder_base : D, G, F, E in the lift frame.
+    coupler_pin, extension_start : I and J in the jib frame; the tip lies `stroke` farther along x.
+    lift_cylinder_length, jib_cylinder_length : |CD| and |EH| at zero stroke.
+    rocker_length, coupler_length : |FH| and |HI|.
+    stroke_maximum : longest strokes of lift, jib and extension cylinder; the shortest are zero.
+    """
+
+    lift_pivot: Vector
+    lift_cylinder_base: Vector
+    lift_cylinder_head: Vector
+    jib_pivot: Vector
+    rocker_pivot: Vector
+    jib_cylinder_base: Vector
+    coupler_pin: Vector
+    extension_start: Vector
+    lift_cylinder_length: float
+    jib_cylinder_length: float
+    rocker_length: float
+    coupler_length: float
+    stroke_maximum: tuple[float, float, float]
 
 
 class CranePose(NamedTuple):
@@ -54,15 +81,15 @@ def pose(geometry: CraneGeometry, strokes: Array) -> CranePose:
     jib_pivot = from_lift(geometry.jib_pivot)
     from_jib = partial(placed, jib_pivot, jib_angle)
     return CranePose(
-        lift_cylinder_base=pivot + np.array(geometry.lift_cylinder_base),
+        lift_cylinder_base=np.broadcast_to(np.array(geometry.lift_cylinder_base), pivot.shape),
         lift_pivot=pivot,
         lift_cylinder_head=from_lift(geometry.lift_cylinder_head),
         jib_pivot=jib_pivot,
-        rocker_pivot=from_lift(rocker_pivot_in_lift(geometry)),
-        jib_cylinder_base=from_lift(jib_cylinder_base_in_lift(geometry)),
+        rocker_pivot=from_lift(geometry.rocker_pivot),
+        jib_cylinder_base=from_lift(geometry.jib_cylinder_base),
         rocker_head=from_lift(rocker_head),
         coupler_pin=from_jib(geometry.coupler_pin),
-        extension_start=from_jib(extension_start_in_jib(geometry)),
+        extension_start=from_jib(geometry.extension_start),
         tip=from_jib(_tip_in_jib(geometry, strokes[:, 2])),
         lift_angle=lift_angle,
         jib_angle=jib_angle,
@@ -149,23 +176,8 @@ def rotate(angle: Array, vectors: Array) -> Array:
     return np.stack([c * x - s * y, s * x + c * y], axis=-1)
 
 
-def rocker_pivot_in_lift(geometry: CraneGeometry) -> Vector:
-    """F in the lift frame, m."""
-    return _add(geometry.jib_pivot, geometry.rocker_pivot)
-
-
-def jib_cylinder_base_in_lift(geometry: CraneGeometry) -> Vector:
-    """E in the lift frame, m."""
-    return _add(rocker_pivot_in_lift(geometry), geometry.jib_cylinder_base)
-
-
-def extension_start_in_jib(geometry: CraneGeometry) -> Vector:
-    """J in the jib frame, m."""
-    return _add(geometry.coupler_pin, geometry.extension_start)
-
-
-def _add(a: Vector, b: Vector) -> Vector:
-    return (a[0] + b[0], a[1] + b[1])
+def _from(origin: Vector, point: Vector) -> Vector:
+    return (point[0] - origin[0], point[1] - origin[1])
 
 
 def _arg(vector: Vector) -> float:
@@ -189,19 +201,21 @@ def _opposite_side(a: float, b: float, angle: Array) -> Array:
 
 
 def _tip_in_jib(geometry: CraneGeometry, extension: Array) -> Array:
-    start = extension_start_in_jib(geometry)
+    start = geometry.extension_start
     return np.stack([start[0] + extension, np.full_like(extension, start[1])], axis=-1)
 
 
 def _lift_angle(geometry: CraneGeometry, stroke: Array) -> Array:
-    base, head = geometry.lift_cylinder_base, geometry.lift_cylinder_head
+    base = _from(geometry.lift_pivot, geometry.lift_cylinder_base)
+    head = geometry.lift_cylinder_head
     length = geometry.lift_cylinder_length + stroke
     opening = _opposite_angle(np.hypot(*base), np.hypot(*head), length)
     return _arg(base) + opening - _arg(head)
 
 
 def _lift_stroke(geometry: CraneGeometry, lift_angle: Array) -> Array:
-    base, head = geometry.lift_cylinder_base, geometry.lift_cylinder_head
+    base = _from(geometry.lift_pivot, geometry.lift_cylinder_base)
+    head = geometry.lift_cylinder_head
     opening = _wrap(lift_angle + _arg(head) - _arg(base))
     length = _opposite_side(np.hypot(*base), np.hypot(*head), opening)
     return length - geometry.lift_cylinder_length
@@ -210,8 +224,8 @@ def _lift_stroke(geometry: CraneGeometry, lift_angle: Array) -> Array:
 def _jib_angle(geometry: CraneGeometry, stroke: Array) -> tuple[Array, Array]:
     """Jib angle relative to the lift arm (n,), and H in the lift frame (n, 2)."""
     pivot = np.array(geometry.jib_pivot)
-    rocker_pivot = np.array(rocker_pivot_in_lift(geometry))
-    base = geometry.jib_cylinder_base
+    rocker_pivot = np.array(geometry.rocker_pivot)
+    base = _from(geometry.rocker_pivot, geometry.jib_cylinder_base)
     length = geometry.jib_cylinder_length + stroke
     # H lies above the arm: clockwise from the direction F -> E
     rocker_angle = _arg(base) - _opposite_angle(np.hypot(*base), geometry.rocker_length, length)
@@ -227,7 +241,7 @@ def _jib_angle(geometry: CraneGeometry, stroke: Array) -> tuple[Array, Array]:
 
 def _jib_stroke(geometry: CraneGeometry, relative_angle: Array) -> Array:
     pivot = np.array(geometry.jib_pivot)
-    rocker_pivot = np.array(rocker_pivot_in_lift(geometry))
+    rocker_pivot = np.array(geometry.rocker_pivot)
     radius = float(np.hypot(*geometry.coupler_pin))
     pin = pivot + radius * _unit(relative_angle + _arg(geometry.coupler_pin))
     to_pin = pin - rocker_pivot
@@ -235,7 +249,7 @@ def _jib_stroke(geometry: CraneGeometry, relative_angle: Array) -> Array:
     # the mirror image of the forward assembly: H counter-clockwise of F -> I
     side = _opposite_angle(distance, geometry.rocker_length, geometry.coupler_length)
     rocker_angle = np.arctan2(to_pin[:, 1], to_pin[:, 0]) + side
-    base = geometry.jib_cylinder_base
+    base = _from(geometry.rocker_pivot, geometry.jib_cylinder_base)
     opening = _wrap(_arg(base) - rocker_angle)
     length = _opposite_side(np.hypot(*base), geometry.rocker_length, opening)
     return length - geometry.jib_cylinder_length
@@ -269,7 +283,7 @@ def _inverse_branch(
 
 def _extension_borders(geometry: CraneGeometry, targets: Array) -> list[Array]:
     """Extensions (n,) at which a target meets a limit of lift or jib, or the fold; may be NaN."""
-    start = extension_start_in_jib(geometry)
+    start = geometry.extension_start
     from_pivot = targets - np.array(geometry.lift_pivot)
     reach = np.hypot(from_pivot[:, 0], from_pivot[:, 1])
     arm = float(np.hypot(*geometry.jib_pivot))

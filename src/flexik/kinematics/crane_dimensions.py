@@ -1,7 +1,8 @@
 """The dimensions of the crane by name, and a crane that differs in them."""
 
-from flexik.kinematics.crane import Array
-from flexik.machines.crane import CraneGeometry
+from dataclasses import replace
+
+from flexik.kinematics.crane import Array, CraneGeometry
 
 VECTORS = (
     *("lift_pivot", "lift_cylinder_base", "lift_cylinder_head", "jib_pivot"),
@@ -20,4 +21,4 @@ def corrected(geometry: CraneGeometry, offsets: Array) -> CraneGeometry:
         changed[name] = (nominal[0] + x, nominal[1] + y)
     for name, offset in zip(LENGTHS, offsets[2 * len(VECTORS) :].tolist(), strict=True):
         changed[name] = getattr(geometry, name) + offset
-    return geometry.model_copy(update=changed)
+    return replace(geometry, **changed)

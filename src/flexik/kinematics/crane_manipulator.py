@@ -7,13 +7,13 @@ import numpy as np
 from flexik.errors import UnreachableError
 from flexik.kinematics.crane import (
     Array,
+    CraneGeometry,
     forward,
     inverse,
     inverse_with_smallest_extension,
     smallest_extension,
 )
 from flexik.kinematics.manipulator import RigidSolution
-from flexik.machines.crane import CraneGeometry
 
 STEP = 0.01  # m, of initial positions
 

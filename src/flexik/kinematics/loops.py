@@ -37,9 +37,11 @@ class Linkage:
     """The rigid bodies of a machine; raises ParameterError where they are free or held twice.
 
     machine : as its file says.
+    near : that of a machine much like it, from whose poses its own are found.
     """
 
     machine: PlanarMachine
+    near: "Linkage | None" = None
 
     def __post_init__(self) -> None:
         self.starts  # noqa: B018  what is wrong with a machine shows at once
@@ -73,8 +75,11 @@ class Linkage:
     def starts(self) -> tuple[Array, Array, Array]:
         """Coordinates (s, k), poses (s, b, 3) and tangents (s, b, 3, k) on a grid of the limits.
 
-        Raises ParameterError, which names drive and loop, if the loops do not close on all of it.
+        Those of `near` will do where there is one. Raises ParameterError, which names drive and
+        loop, if the loops do not close on all of it.
         """
+        if self.near is not None:
+            return self.near.starts
         middle = (self.lower + self.upper)[None] / 2
         values, poses = middle, self._assembled(middle)
         half = min(max(1, int(N_STARTS ** (1 / len(self.lower))) // 2), MOST_STARTS)
@@ -135,6 +140,8 @@ class Linkage:
     @cached_property
     def _signs(self) -> list[float]:
         """Sign of the determinant of each block, as assembled."""
+        if self.near is not None:
+            return self.near._signs
         middle = (self.lower + self.upper)[None] / 2
         poses = self._assembled(middle)
         return [float(_sign(b.system(poses, middle)[1])[0]) for b in self.blocks]
@@ -148,13 +155,12 @@ class Linkage:
         lost = np.zeros(len(poses), dtype=bool)
         for block, sign in zip(self.blocks, self._signs, strict=True):
             lost |= ~_newton(block, found, ahead, sign)
+        found[lost] = np.nan
         lost &= np.isfinite(poses).all(axis=(1, 2)) & np.isfinite(ahead).all(axis=1)
         if lost.any() and halvings:
             middle = (values[lost] + ahead[lost]) / 2
             between = self._follow(poses[lost], values[lost], middle, tangents[lost], halvings - 1)
             found[lost] = self._follow(between, middle, ahead[lost], None, halvings - 1)
-        elif lost.any():
-            found[lost] = np.nan
         return found
 
     def _followed(self, drive: int, poses: Array, values: Array, ahead: Array) -> Array:

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from flexik.errors import ParameterError
+from flexik.kinematics.crane import CraneGeometry
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.elastic_arm import ArmGeometry
 from flexik.kinematics.manipulator import Array, Manipulator
 from flexik.kinematics.planar import PlanarManipulator
-from flexik.machines.crane import CraneGeometry
 from flexik.machines.planar import PlanarMachine, faults, read_machine
 
 # The tips of a closed form and of the general solution agree this well, m, at so many poses
@@ -66,14 +66,20 @@ def check_machine(machine: PlanarMachine) -> None:
 
 
 def crane_geometry(machine: PlanarMachine) -> CraneGeometry:
-    """Dimensions of a crane by the names of data/machines/planar/crane.yaml.
+    """Dimensions of a crane by the names of data/machines/crane.yaml.
 
     Raises ParameterError if a body, point or drive bears none of these names.
     """
+    pillar = _point(machine, "ground.flange") - _point(machine, "pillar.flange")
+    frames = {"pillar": pillar, "lift": -_point(machine, "lift.lift_pivot")}
+    frames["jib"] = -_point(machine, "jib.jib_pivot")
 
-    def between(first: str, second: str) -> tuple[float, float]:
-        x, y = (_point(machine, second) - _point(machine, first)).tolist()
+    def point(reference: str) -> tuple[float, float]:
+        x, y = (frames[reference.partition(".")[0]] + _point(machine, reference)).tolist()
         return x, y
+
+    def distance(first: str, second: str) -> float:
+        return float(np.hypot(*(_point(machine, second) - _point(machine, first))))
 
     def cylinder(name: str) -> float:
         drive = machine.drives.get(name)
@@ -82,27 +88,50 @@ def crane_geometry(machine: PlanarMachine) -> CraneGeometry:
         return drive.retracted
 
     lift, jib, extension = _limits(machine, 3)[1]
-    pillar = _point(machine, "ground.flange") - _point(machine, "pillar.flange")
-    pivot = (pillar + _point(machine, "pillar.lift_pivot")).tolist()
     return CraneGeometry(
-        lift_pivot=(pivot[0], pivot[1]),
-        lift_cylinder_base=between("pillar.lift_pivot", "pillar.lift_cylinder_base"),
-        lift_cylinder_head=between("lift.lift_pivot", "lift.lift_cylinder_head"),
-        jib_pivot=between("lift.lift_pivot", "lift.jib_pivot"),
-        rocker_pivot=between("lift.jib_pivot", "lift.rocker_pivot"),
-        jib_cylinder_base=between("lift.rocker_pivot", "lift.jib_cylinder_base"),
-        coupler_pin=between("jib.jib_pivot", "jib.coupler_pin"),
-        extension_start=between("jib.coupler_pin", "jib.extension_start"),
+        lift_pivot=point("pillar.lift_pivot"),
+        lift_cylinder_base=point("pillar.lift_cylinder_base"),
+        lift_cylinder_head=point("lift.lift_cylinder_head"),
+        jib_pivot=point("lift.jib_pivot"),
+        rocker_pivot=point("lift.rocker_pivot"),
+        jib_cylinder_base=point("lift.jib_cylinder_base"),
+        coupler_pin=point("jib.coupler_pin"),
+        extension_start=point("jib.extension_start"),
         lift_cylinder_length=cylinder("lift"),
         jib_cylinder_length=cylinder("jib"),
-        rocker_length=float(np.hypot(*between("rocker.rocker_pivot", "rocker.rocker_head"))),
-        coupler_length=float(np.hypot(*between("coupler.rocker_head", "coupler.coupler_pin"))),
+        rocker_length=distance("rocker.rocker_pivot", "rocker.rocker_head"),
+        coupler_length=distance("coupler.rocker_head", "coupler.coupler_pin"),
         stroke_maximum=(lift, jib, extension),
     )
 
 
+def with_geometry(machine: PlanarMachine, geometry: CraneGeometry) -> PlanarMachine:
+    """The crane `machine`, whose frames are those of `geometry`, with these dimensions."""
+    points = {
+        "pillar": ("lift_pivot", "lift_cylinder_base"),
+        "lift": ("lift_cylinder_head", "jib_pivot", "rocker_pivot", "jib_cylinder_base"),
+        "jib": ("coupler_pin", "extension_start"),
+    }
+    found: dict[str, object] = {
+        f"bodies.{body}.points.{name}": getattr(geometry, name)
+        for body, names in points.items()
+        for name in names
+    }
+    along = machine.located("jib.front_pad").point[0], geometry.extension_start[1]
+    return machine.with_constants(
+        found
+        | {
+            "bodies.jib.points.front_pad": along,
+            "bodies.rocker.points.rocker_head": (geometry.rocker_length, 0.0),
+            "bodies.coupler.points.coupler_pin": (geometry.coupler_length, 0.0),
+            "drives.lift.retracted": geometry.lift_cylinder_length,
+            "drives.jib.retracted": geometry.jib_cylinder_length,
+        }
+    )
+
+
 def arm_geometry(machine: PlanarMachine) -> ArmGeometry:
-    """Dimensions of a two-link arm by the names of data/machines/planar/elastic_arm.yaml."""
+    """Dimensions of a two-link arm by the names of data/machines/elastic_arm.yaml."""
     ends = ("link_1.joint_1", "link_1.joint_2"), ("link_2.joint_2", "link_2.tip")
     lengths = [float(np.hypot(*(_point(machine, b) - _point(machine, a)))) for a, b in ends]
     low, high = _limits(machine, 2)

@@ -13,6 +13,9 @@ from flexik.parameters.model import Count, Model, Positive
 
 # Abscissas this close are the same, m
 TOLERANCE = 1e-6
+# Below this distance two stations of a beam share a node: short elements are so stiff that the
+# round-off floor of the solver rises above its tolerance, m
+MERGE_DISTANCE = 0.03
 # Elements of a beam
 MOST_ELEMENTS = 500
 
@@ -80,6 +83,10 @@ class Rigid(_Body):
     kind: Literal["rigid"]
     mass: Mass
     centre: Point
+
+    def weight(self) -> tuple[float, Point]:
+        """Mass in kg without further masses, and its centre in the frame of the body."""
+        return self.mass, self.centre
 
 
 class Beam(_Body):
@@ -172,6 +179,8 @@ class Beam(_Body):
     def _complete(self) -> Self:
         if len(self.axis) < 2 or not (self._lengths > 0).all():
             raise ValueError("axis: expected two points or more, neighbours apart")
+        if len(self.axis) > 2 and self._lengths.min() < MERGE_DISTANCE:
+            raise ValueError(f"axis: expected corners {MERGE_DISTANCE} m apart or more")
         if (self.density is None) == (self.mass is None or self.centre is None):
             raise ValueError("mass: expected mass and centre, or else density")
         if self.mass_span is not None:

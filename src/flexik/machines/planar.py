@@ -1,4 +1,4 @@
-"""A planar flexible manipulator as a file data/machines/planar/NAME.yaml describes it.
+"""A planar flexible manipulator as a file data/machines/NAME.yaml describes it.
 
 Units: m, kg, N, Pa, rad; an angle may stand in degrees under its key with `_degrees` appended. The
 ground has x forward and y up. Every body has a frame of its own, in which its points, its axis and
@@ -189,16 +189,27 @@ class PlanarMachine(Angled):
         """The bodies that bend."""
         return {name: body for name, body in self.bodies.items() if isinstance(body, Beam)}
 
-    def masses(self) -> dict[str, float]:
-        """What weighs, kg by dotted key; raises DataError if a section cannot be read."""
-        found: dict[str, float] = {}
+    @property
+    def section_files(self) -> dict[str, str]:
+        """Files of section tables by beam."""
+        kinds = {name: beam.section for name, beam in self.beams.items()}
+        return {name: kind.file for name, kind in kinds.items() if kind.kind == "table"}
+
+    def masses(self) -> dict[str, tuple[str, Point, float]]:
+        """What weighs by dotted key: body, point in its frame, kg.
+
+        Raises DataError if a section cannot be read.
+        """
+        found: dict[str, tuple[str, Point, float]] = {}
         for name, body in self.bodies.items():
-            mass = body.weight()[0] if isinstance(body, Beam) else body.mass
-            found[f"bodies.{name}.mass"] = mass
-            found |= {f"bodies.{name}.masses.{point}": m for point, m in body.masses.items()}
+            mass, centre = body.weight()
+            found[f"bodies.{name}.mass"] = (name, centre, mass)
+            for point, further in body.masses.items():
+                found[f"bodies.{name}.masses.{point}"] = (name, body.points[point], further)
         for name, drive in self.drives.items():
             if isinstance(drive, Cylinder):
-                found |= {f"drives.{name}.masses.{k}": m for k, m in enumerate(drive.masses)}
+                for k, (end, mass) in enumerate(zip(drive.of, drive.masses, strict=True)):
+                    found[f"drives.{name}.masses.{k}"] = (*self.located(end), mass)
         return found
 
     def located(self, reference: str) -> Located:
@@ -216,7 +227,7 @@ class PlanarMachine(Angled):
         """Dotted keys of the constants that are to be fitted."""
         return [".".join(key) for key, value in _leaves(self.model_dump()) if value == "fit"]
 
-    def with_constants(self, constants: Mapping[str, float]) -> "PlanarMachine":
+    def with_constants(self, constants: Mapping[str, Any]) -> "PlanarMachine":
         """The same with values for dotted keys; raises ParameterError if one is no such key."""
         data = self.model_dump()
         for key, value in constants.items():
@@ -290,7 +301,7 @@ def faults(machine: PlanarMachine) -> list[str]:
 
 
 def _wrong_masses(machine: PlanarMachine) -> list[str]:
-    masses = machine.masses()
+    masses = {key: mass for key, (_, _, mass) in machine.masses().items()}
     total = sum(masses.values())
     return [
         f"{key}: expected kg, {mass:g} of {total:.4g} in all ({mass:g} t would be {1e3 * mass:g})"

@@ -8,11 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from flexik.machines.bodies import MERGE_DISTANCE
 from flexik.machines.sections import Array, Section
 
-# Below this distance two stations of a beam share a node: short elements are so stiff that the
-# round-off floor of the solver rises above its tolerance, m
-MERGE_DISTANCE = 0.03
+# Of the second moment of an element's flexibility, what its neighbour may take
+MOST_MOVED = 0.8
 
 # Gauss-Legendre points and weights on [-1, 1], a panel between two rows of a section table
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(4)
@@ -117,6 +117,32 @@ def _stations(span: tuple[float, float], pins: tuple[float, ...], longest: float
     return mesh
 
 
+def _centred(
+    bending: Array, off: Array, middle: Array, residual: Array, apart: list[int], ends: Array
+) -> tuple[Array, Array]:
+    """Flexibilities of bending and their second moments, as elements of one hinge carry them.
+
+    The hinge of an element is in its `middle`, that of its flexibility `off` it, m. A share of the
+    flexibility goes to the element beside it, so that where moments are linear over the two every
+    moment up to the second stays: a mesh errs by what it errs with a uniform beam. Not across nodes
+    `apart`, where forces may turn the beam; elements before `ends` are none.
+    """
+    part = np.searchsorted(np.unique(apart), np.arange(len(bending)), side="right")
+    part[ends - 1] = -1 - np.arange(len(ends))
+    after = np.append(part[1:] == part[:-1], False)
+    before = np.append(False, after[:-1])
+    ahead = np.where(off > 0, after, ~before & after)
+    to = np.where(ahead, 1, np.where(before, -1, 0))
+    other = np.arange(len(bending)) + to
+    distance = np.where(to == 0, 1.0, middle[other] - middle)
+    given = np.where(to == 0, 0.0, bending * off / distance)
+    most = MOST_MOVED * residual / distance**2
+    given = np.clip(given, -most, most)
+    moved = bending - given
+    np.add.at(moved, other, given)
+    return moved, residual - given * distance**2
+
+
 def nearest(stations: Array, abscissa: float) -> int:
     """Number of the station nearest to `abscissa` in m."""
     return int(np.abs(stations - abscissa).argmin())
@@ -142,12 +168,19 @@ def _reduce(
     of_element = factor[0] * area + factor[1] * area_x
     at_end = (factor[0] * area_x + factor[1] * area_xx - nodes * of_element) / length
     at_start, stiffness = of_element - at_end, beam.youngs_modulus * length
+    numbers = [
+        tuple(nearest(of_mesh, pin) for pin in at)
+        for of_mesh, at in zip(stations, pins, strict=True)
+    ]
+    begins = ends - [len(of_mesh) for of_mesh in stations]
+    apart = [begin + k for begin, at in zip(begins, numbers, strict=True) for k in (0, *at)]
+    bending, residual = _centred(bending, first / bending - middle, middle, residual, apart, ends)
     found = []
-    for of_mesh, end, at in zip(stations, ends, pins, strict=True):
-        of = slice(end - len(of_mesh), end - 1)
+    for of_mesh, begin, end, at in zip(stations, begins, ends, numbers, strict=True):
+        of = slice(begin, end - 1)
         elements = Elements(
             of_mesh,
-            tuple(nearest(of_mesh, pin) for pin in at),
+            at,
             stiffness[of] / bending[of],
             stiffness[of] / axial[of],
             residual[of] / beam.youngs_modulus,

@@ -97,10 +97,7 @@ class PlacedBeam:
 
     def rotation(self, node: int) -> float:
         """Angle of a node from x in the current solution, rad."""
-        number = self.nodes[node]
-        moved = self.system.GetNodeOutput(number, exu.OutputVariableType.Coordinates)
-        turned = np.add(moved, self.system.GetNodeParameter(number, "referenceCoordinates"))[2:]
-        return float(np.arctan2(turned[1], turned[0]) if self.ancf else turned[0])
+        return rotation_of(self.system, self.nodes[node])
 
     def position(self, node: int) -> Array:
         """Place (2,) of a node in the current solution, m."""
@@ -194,6 +191,13 @@ class PlacedBody:
         return np.array([c * x - s * y, s * x + c * y, rotation])
 
 
+def rotation_of(system: exu.MainSystem, node: int) -> float:
+    """Angle of a node from x in the current solution, rad; of an ANCF node that of its slope."""
+    moved = system.GetNodeOutput(node, exu.OutputVariableType.Coordinates)
+    turned = np.add(moved, system.GetNodeParameter(node, "referenceCoordinates"))[2:]
+    return float(np.arctan2(turned[1], turned[0]) if len(turned) > 1 else turned[0])
+
+
 def place_beam(
     system: exu.MainSystem,
     element: str,
@@ -216,6 +220,30 @@ def place_beam(
     beam.reshape(elements, places)
     beam.move(origin, angle)
     return beam
+
+
+def pin(system: exu.MainSystem, first: int, second: int) -> int:
+    """Make two markers one point; returns the joint."""
+    return system.AddObject({"objectType": "JointRevolute2D", "markerNumbers": [first, second]})
+
+
+def pad(system: exu.MainSystem, touched: int, line: float, other: int, other_line: float) -> None:
+    """Keep marker `other` on a line through marker `touched`, at these angles in their frames."""
+    pair = {"markerNumbers": [touched, other], "constrainRotation": False}
+    axis = [float(np.cos(line)), float(np.sin(line)), 0.0]
+    normal = [-float(np.sin(other_line)), float(np.cos(other_line)), 0.0]
+    joint = {"objectType": "JointPrismatic2D", "axisMarker0": axis, "normalMarker1": normal}
+    system.AddObject({**joint, **pair})
+
+
+def spring(system: exu.MainSystem, markers: list[int], x: Any, y: Any) -> None:
+    """Springs between two markers in the first one's frame, N/m; rigid where there is none."""
+    stiffness = np.diag([x or 0.0, y or 0.0, 0.0, 0.0, 0.0, 0.0])
+    connector = {"objectType": "ConnectorRigidBodySpringDamper", "markerNumbers": markers}
+    system.AddObject({**connector, "stiffness": stiffness})
+    if not (x and y):
+        along = 0.0 if x else np.pi / 2
+        pad(system, markers[0], along, markers[1], along)
 
 
 def hang(system: exu.MainSystem, marker: int, mass: float, gravity: float) -> int:

@@ -19,6 +19,7 @@ class FlexibleMachine:
     """A machine whose equilibria can be computed.
 
     refinement : every beam is cut into this many times its n_elements.
+    near : see kinematics.loops.Linkage.
 
     Raises ParameterError where a constant is not known, or what the elements cannot do is asked of
     them.
@@ -26,6 +27,7 @@ class FlexibleMachine:
 
     machine: PlanarMachine
     refinement: int = 1
+    near: Linkage | None = None
 
     def __post_init__(self) -> None:
         machine = self.machine
@@ -60,7 +62,7 @@ class FlexibleMachine:
     @cached_property
     def linkage(self) -> Linkage:
         """The rigid bodies."""
-        return Linkage(self.machine)
+        return Linkage(self.machine, self.near)
 
     @cached_property
     def beams(self) -> dict[str, Beam]:
@@ -104,6 +106,8 @@ class FlexibleMachine:
             ]
             pins = [tuple(row) for row in np.column_stack([fixed, *feet]).tolist()]
             found.append(discretise(self.beams[name], pins, self.refinement))
+        if not found:
+            return [{} for _ in touched]
         return [dict(zip(names, row, strict=True)) for row in zip(*found, strict=True)]
 
     @property

@@ -7,8 +7,7 @@ import pandas as pd
 
 from flexik.cases.crane.parts.measured.fields import ADAPTED, METHODS, MISJUDGED, TARGET
 from flexik.cases.crane.report_mechanism import LINK_LOOKS, links
-from flexik.kinematics.crane import smallest_extension
-from flexik.machines.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry, smallest_extension
 from flexik.reporting import kinds, style
 from flexik.reporting.chart import Axis, Layer, chart
 from flexik.reporting.report import Drawing, draw

@@ -7,15 +7,14 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
-from flexik.cases.crane.parts.crane import flexible
+from flexik.cases.crane.parts.crane import FlexibleCrane, flexible
 from flexik.cases.crane.parts.measured.errors import campaign_errors
 from flexik.cases.crane.parts.measured.fields import TARGET
 from flexik.cases.crane.report_results import REFERENCE
 from flexik.cases.crane.section import Section
 from flexik.datasets.tables import read_csv, read_table
 from flexik.kinematics.crane import inverse_with_smallest_extension
-from flexik.multibody.crane.statics import joint_forces
-from flexik.multibody.crane.structure import FlexibleCrane
+from flexik.multibody.joint_forces import joint_forces
 
 # data/reference/crane/measured_errors.csv and measured_reference_errors.csv hold tables 4.2 and 4.3
 # as printed. Over all payloads and without compensation table 4.2, and the text with it, has a
@@ -107,6 +106,5 @@ def jib_pushes(results: Measured) -> tuple[np.ndarray, np.ndarray]:
 
 def jib_force(crane: FlexibleCrane, strokes: np.ndarray, payload: float) -> np.ndarray:
     """Tension (k,) of the jib cylinder in N."""
-    gravity = crane.structure.gravity
-    load = np.tile([0.0, -gravity * payload], (len(strokes), 1))
-    return joint_forces(crane, strokes, load, gravity).joints["jib_cylinder"][:, 0]
+    load = np.tile([0.0, -crane.machine.gravity * payload], (len(strokes), 1))
+    return joint_forces(crane.machine, crane.linkage.poses(strokes), load)["drives.jib"][:, 0]

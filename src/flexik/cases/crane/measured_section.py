@@ -4,7 +4,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from flexik.machines.crane import Clearance, Length, Magnitudes, Relative
+from flexik.machines.deviations import Clearance, Length, Magnitudes, Relative
 from flexik.parameters.conditions import Points
 from flexik.parameters.model import (
     Count,

@@ -27,7 +27,7 @@ CONDITION_COLUMNS = [
 
 def report(section: Section) -> None:
     """Write tables, figures and page."""
-    sections = section.machine.structure.beams.sections.values()
+    sections = section.machine.section_files.values()
     made_from: list[Path | str] = [*sections, *sorted(REFERENCE.glob("*.csv"))]
     whole = content(read(section)) | measured(section)
     write_case(section, Path(__file__).with_name("page.md.j2"), whole, made_from)

@@ -25,7 +25,7 @@ VARIANTS = ("_selected", "_ga", "_gauss_newton")
 def figures(results: Results) -> dict[str, Drawing]:
     """All figures by name."""
     return {
-        "crane": crane(results.section.machine.geometry, results.shape),
+        "crane": crane(results.section.geometry, results.shape),
         "training_points": _training_points(results),
         "test_points": _test_points(results),
         "initial_positions": _initial_positions(results),
@@ -69,7 +69,7 @@ def _sequence(
 
 def _training_points(results: Results) -> Drawing:
     """All training points, and enlarged those about the largest deflection."""
-    geometry = results.section.machine.geometry
+    geometry = results.section.geometry
     kept = results.kept.sort_values("payload", ascending=False, kind="stable")
     far = int(np.hypot(*deflection(kept).T).argmax())
     tip = kept[["tip_x", "tip_y"]].to_numpy()[far]
@@ -125,7 +125,7 @@ def _test_points(results: Results) -> Drawing:
 
 def _initial_positions(results: Results) -> Drawing:
     names = [style.coordinates(*point) for point in results.points]
-    manipulator = CraneManipulator(results.section.machine.geometry)
+    manipulator = CraneManipulator(results.section.geometry)
     initial = manipulator.initial_positions(np.array(results.points))
     parts = links(manipulator.geometry, initial)
     parts["point"] = [names[k] for k in parts["crane"]]

@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from flexik.kinematics.crane import pose
-from flexik.machines.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry, pose
 from flexik.reporting import style
 from flexik.reporting.chart import Axis, Layer, chart
 from flexik.reporting.report import Drawing, draw

@@ -217,7 +217,7 @@ def query_key(section: Section, name: str) -> str:
     method = section.methods[name]
     network = section.networks[method.network].model_dump() if method.network else None
     given = method.model_dump(exclude={"n_targets"})
-    return digest([section.machine.geometry.model_dump(), given, network])
+    return digest([section.geometry, given, network])
 
 
 def published() -> dict[str, pd.DataFrame]:

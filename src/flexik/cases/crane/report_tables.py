@@ -210,7 +210,7 @@ def _race(curves: pd.DataFrame) -> Table:
 
 def _size_rules(results: Results) -> pd.DataFrame:
     """What rules of thumb would have chosen."""
-    rows, geometry = [], results.section.machine.geometry
+    rows, geometry = [], results.section.geometry
     for name, (_, chosen) in results.studies.items():
         learns, network = results.section.networks[name].learns, results.trained[name]
         n_samples = len(learnt_rows(results.kept, learns or "correction", geometry))

@@ -9,10 +9,10 @@ from pydantic import Field, model_validator
 
 from flexik.cases.crane.measured_section import Measured
 from flexik.cases.crane.parts.measured.campaign_file import own_campaign
-from flexik.errors import DataError, ParameterError
-from flexik.kinematics.crane import check_assembly, smallest_extension
-from flexik.machines.crane import LENGTH_TOLERANCE, Machine
-from flexik.machines.sections import read_section
+from flexik.errors import ParameterError
+from flexik.kinematics.crane import CraneGeometry, smallest_extension
+from flexik.kinematics.machine_file import check_machine, crane_geometry
+from flexik.machines.planar import PlanarMachine
 from flexik.parameters.conditions import ConditionSet, Points, RandomTargets, check_different
 from flexik.parameters.model import Count, Model, Name, NotNegative, Positive, Seed, Share
 from flexik.parameters.networks import Axis, Network, check_networks
@@ -22,6 +22,10 @@ from flexik.positioning.inverted_network import InvertedSettings
 from flexik.positioning.registry import Methods, check_methods
 
 STROKES = ("lift", "jib", "extension")
+# The one free constant of the machine file
+SPRING = "joints.slew.springs.torsion"
+# Strokes closer than this are the same, m
+LENGTH_TOLERANCE = 1e-9
 
 # The published test conditions [chapter 4], as far as they are known: see `conditions` there
 PUBLISHED = Points(
@@ -144,7 +148,7 @@ class Studies(Model):
 class Section(CaseSection):
     """The log crane."""
 
-    machine: Machine
+    machine: PlanarMachine
     calibration: Calibration = Calibration()  # type: ignore[assignment]
     samples: Samples
     networks: Annotated[dict[Name, CraneNetwork], Field(min_length=1)]
@@ -153,14 +157,26 @@ class Section(CaseSection):
     studies: Studies
 
     @property
+    def geometry(self) -> CraneGeometry:
+        """Dimensions of the machine."""
+        return crane_geometry(self.machine)
+
+    @property
     def files(self) -> list[Path]:
         """Section tables, and a campaign of the user's own."""
         own = self.studies.measured.campaign.file
-        tables = self.machine.structure.beams.sections.values()
+        tables = self.machine.section_files.values()
         return [Path(file) for file in (*tables, *([] if own is None else [own]))]
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        if self.machine.kinematics != "crane":
+            raise ValueError("machine.kinematics: expected crane, of which this case is")
+        if self.machine.free != [SPRING]:
+            raise ValueError(
+                f"machine.{SPRING}: expected fit, and a value for everything else; a known value "
+                "stands under calibration.stiffness"
+            )
         self._check_strokes()
         self._check_fitting()
         check_networks(self.networks, self.trainers)
@@ -179,7 +195,7 @@ class Section(CaseSection):
         return self
 
     def _check_strokes(self) -> None:
-        reach = dict(zip(STROKES, self.machine.geometry.stroke_maximum, strict=True))
+        reach = dict(zip(STROKES, self.geometry.stroke_maximum, strict=True))
         for name, longest in reach.items():
             axis = getattr(self.samples.grid, name)
             if axis.minimum < 0.0 or axis.maximum > longest + LENGTH_TOLERANCE:
@@ -226,22 +242,15 @@ class Section(CaseSection):
 
 
 def check(section: Section) -> None:
-    """Section tables are there, the linkage closes, targets are reached.
+    """The machine is one, targets are reached.
 
     Raises ParameterError naming the key.
     """
-    machine, geometry = section.machine, section.machine.geometry
-    for name, path in machine.structure.beams.sections.items():
-        try:
-            read_section(path)
-        except DataError as error:
-            raise ParameterError(
-                f"{section.machine_file}: structure.beams.{name}.section: {error}"
-            ) from None
+    geometry = section.geometry
     try:
-        check_assembly(geometry)
-    except ParameterError as error:
-        raise ParameterError(f"{section.machine_file}: geometry: {error}") from None
+        check_machine(section.machine)
+    except ValueError as error:
+        raise ParameterError(f"{section.machine_file}: {error}") from None
     measured = section.studies.measured
     sets = {f"conditions.{name}": given for name, given in section.conditions.items()} | {
         "calibration.conditions": section.calibration.conditions,

@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from flexik.cases.crane.parts.conditions import at_points
-from flexik.cases.crane.parts.crane import columns_of
+from flexik.cases.crane.parts.crane import columns_of, on_spring
 from flexik.cases.crane.section import Calibration, Section
 from flexik.datasets.parts import Part, Work, Writer, json_file, whole
 from flexik.datasets.tables import read_csv
@@ -17,9 +17,9 @@ from flexik.errors import DataError
 from flexik.evaluation.calibration import fit_spring
 from flexik.evaluation.errors import evaluate, statistics, tip_judge
 from flexik.kinematics.crane_manipulator import CraneManipulator
-from flexik.machines.crane import Machine
-from flexik.multibody.crane.assembly import flexible_crane
-from flexik.multibody.crane.model import tips
+from flexik.kinematics.machine_file import crane_geometry
+from flexik.machines.planar import PlanarMachine
+from flexik.multibody.planar import tips
 from flexik.positioning.none import Uncompensated
 
 PUBLISHED = Path("data/reference/crane/positioning_errors.csv")
@@ -28,30 +28,30 @@ PUBLISHED = Path("data/reference/crane/positioning_errors.csv")
 def parts(section: Section) -> list[Part]:
     """`spring`."""
     settings = {"machine": section.machine, "calibration": section.calibration}
-    sections = section.machine.structure.beams.sections
+    sections = section.machine.section_files
     return [Part("spring", prepare, settings, {"published": PUBLISHED, "sections": sections})]
 
 
 def prepare(
-    *, machine: Machine, calibration: Calibration, published: Path, sections: dict[str, Path]
+    *, machine: PlanarMachine, calibration: Calibration, published: Path, sections: dict[str, Path]
 ) -> Work:
     """Fit the spring, or take the known one."""
     return whole(_spring, machine=machine, calibration=calibration, published=published)
 
 
-def _spring(machine: Machine, calibration: Calibration, published: Path) -> dict[str, Writer]:
+def _spring(machine: PlanarMachine, calibration: Calibration, published: Path) -> dict[str, Writer]:
     if calibration.stiffness is not None:
         print(f"ground spring {calibration.stiffness:.6g} N m/rad, as given")
         return {".json": json_file({"spring_stiffness": calibration.stiffness})}
     table = read_csv(published, ("none",), ("statistic",)).set_index("statistic")["none"]
     if "mean_error" not in table:
         raise DataError(f"{published}: expected a row mean_error")
-    manipulator, columns = CraneManipulator(machine.geometry), columns_of(machine)
+    manipulator, columns = CraneManipulator(crane_geometry(machine)), columns_of(machine)
     conditions = at_points(calibration.conditions, manipulator)
     method = Uncompensated(manipulator)
 
     def uncompensated(stiffness: float) -> pd.DataFrame:
-        judge = tip_judge(functools.partial(tips, flexible_crane(machine, stiffness)))
+        judge = tip_judge(functools.partial(tips, on_spring(machine, stiffness)))
         return pd.DataFrame(evaluate(method, conditions, judge, columns))
 
     mean_error = 1e-3 * float(table["mean_error"])

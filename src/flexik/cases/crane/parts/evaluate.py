@@ -28,8 +28,8 @@ from flexik.evaluation.conditions import Conditions
 from flexik.evaluation.errors import Judge, evaluate, fields_of, statistics, tip_judge
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.learning.storage import Trained, TrainingRecord, load_networks
-from flexik.machines.crane import Machine
-from flexik.multibody.crane.model import tips
+from flexik.machines.planar import PlanarMachine
+from flexik.multibody.planar import tips
 from flexik.parameters.conditions import Points
 from flexik.positioning.method import Columns, Method, Settings
 from flexik.positioning.registry import Build
@@ -77,7 +77,7 @@ def _part(section: Section, conditions: str, name: str) -> Part:
 
 def prepare(
     *,
-    machine: Machine,
+    machine: PlanarMachine,
     name: str,
     method: Settings,
     build: Build,

@@ -23,8 +23,8 @@ from flexik.errors import ParameterError, TrainingError
 from flexik.kinematics.crane import forward
 from flexik.learning.perceptron import Network, quantities
 from flexik.learning.training import Architecture, Lesson, train
-from flexik.machines.crane import Machine
-from flexik.multibody.crane.model import tips
+from flexik.machines.planar import PlanarMachine
+from flexik.multibody.planar import tips
 
 FIELDS = (
     Field("n_hidden", "1", "neurons in the hidden layer", "int64"),
@@ -49,7 +49,7 @@ def part(section: Section) -> Part:
 
 def prepare(
     *,
-    machine: Machine,
+    machine: PlanarMachine,
     study: Fitting,
     trainer: Any,
     spring: Path,

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from flexik.cases.crane.parts.fields import SAMPLE_FIELDS, STROKES, deflection, kept
 from flexik.datasets.tables import Field, read_table
-from flexik.kinematics.crane import forward, inverse
+from flexik.kinematics.crane import CraneGeometry, forward, inverse
 from flexik.learning.perceptron import quantities
 from flexik.learning.training import Architecture, Lesson
-from flexik.machines.crane import CraneGeometry
 from flexik.parameters.trainers import Stopping
 
 Array = NDArray[np.float64]

@@ -8,16 +8,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.cases.crane.parts.crane import flexible, model_inputs
+from flexik.cases.crane.parts.crane import FlexibleCrane, flexible, model_inputs
 from flexik.cases.crane.parts.samples import Samples, random_samples
 from flexik.cases.crane.section import MeshStudy, Section
 from flexik.datasets.parts import Part, Work, Writer, table
 from flexik.datasets.tables import Field
 from flexik.kinematics.crane import forward
-from flexik.machines.crane import Machine
-from flexik.multibody.crane.model import tips
-from flexik.multibody.crane.structure import FlexibleCrane
+from flexik.machines.planar import PlanarMachine
 from flexik.multibody.elements import ELEMENTS
+from flexik.multibody.planar import tips
 
 FIELDS = (
     Field("n_samples", "1", "random strokes and payloads", "int64"),
@@ -43,7 +42,7 @@ def part(section: Section) -> Part:
 
 def prepare(
     *,
-    machine: Machine,
+    machine: PlanarMachine,
     study: MeshStudy,
     payload: tuple[float, float],
     minimum_tip_x: float,
@@ -53,7 +52,7 @@ def prepare(
     """Tips of every variant; the last refinement of the machine's own element is the reference."""
     crane = flexible(machine, spring)
     samples = random_samples(crane.geometry, study.n_samples, payload, minimum_tip_x, study.seed)
-    variants = [(crane.element, study.refinements[-1])]
+    variants: list[tuple[str, int]] = [(machine.element, study.refinements[-1])]
     variants += [(element, n) for element in ELEMENTS for n in study.refinements]
     rigid = forward(crane.geometry, samples.strokes)
 
@@ -76,7 +75,8 @@ def prepare(
 def _tips(
     crane: FlexibleCrane, samples: Samples, variant: tuple[str, int]
 ) -> dict[str, NDArray[np.float64]]:
-    other = replace(crane, element=variant[0], refinement=variant[1])
+    machine = crane.machine.with_constants({"element": variant[0]})
+    other = replace(crane, machine=machine, refinement=variant[1])
     return {"tip": tips(other, samples.strokes, samples.payload)}
 
 

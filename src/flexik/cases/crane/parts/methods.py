@@ -52,6 +52,6 @@ def method_of(section: Section, name: str) -> Method:
     if name not in section.methods:
         known = ", ".join(section.methods)
         raise ParameterError(f"{section.name}.methods: there is no {name!r} ({known})")
-    manipulator = CraneManipulator(section.machine.geometry)
+    manipulator = CraneManipulator(section.geometry)
     inputs = method_inputs(section, name)
     return trained_method(**method_settings(section, name), manipulator=manipulator, **inputs)

@@ -11,15 +11,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from flexik.cases.crane.parts.crane import flexible, model_inputs
+from flexik.cases.crane.parts.crane import FlexibleCrane, flexible, model_inputs
 from flexik.cases.crane.parts.fields import FAILED, INPUTS, KEPT, LEFT_OUT, SAMPLE_FIELDS
 from flexik.cases.crane.section import Grid, Section, Selection
 from flexik.datasets.parts import Part, Work, Writer, stacked, table
 from flexik.errors import ParameterError, SolverError
-from flexik.kinematics.crane import forward
-from flexik.machines.crane import CraneGeometry, Machine
-from flexik.multibody.crane.model import solve
-from flexik.multibody.crane.structure import FlexibleCrane
+from flexik.kinematics.crane import CraneGeometry, forward
+from flexik.machines.planar import PlanarMachine
+from flexik.multibody.planar import solve
 
 Array = NDArray[np.float64]
 
@@ -48,7 +47,7 @@ def parts(section: Section) -> list[Part]:
 def prepare(
     *,
     name: str,
-    machine: Machine,
+    machine: PlanarMachine,
     minimum_tip_x: float,
     maximum_failed_share: float,
     drawn: Grid | Selection,

@@ -10,10 +10,10 @@ from flexik.cases.crane.parts.learning import lesson
 from flexik.cases.crane.parts.train import data_inputs, described, part
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part, Work
+from flexik.kinematics.crane import CraneGeometry
 from flexik.learning.size_selection import select
 from flexik.learning.storage import load_network
 from flexik.learning.training import Architecture
-from flexik.machines.crane import CraneGeometry
 from flexik.parameters.trainers import Stopping
 
 CORRECTED = "corrected"

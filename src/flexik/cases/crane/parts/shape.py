@@ -8,8 +8,8 @@ from flexik.cases.crane.parts.crane import flexible, model_inputs
 from flexik.cases.crane.section import Section, Shape
 from flexik.datasets.parts import Part, Work, Writer, json_file, whole
 from flexik.kinematics.crane import forward
-from flexik.machines.crane import Machine
-from flexik.multibody.crane.model import equilibrium, reference_shapes
+from flexik.machines.planar import PlanarMachine
+from flexik.multibody.planar import shapes
 
 
 def part(section: Section) -> Part:
@@ -18,22 +18,23 @@ def part(section: Section) -> Part:
     return Part("shape", prepare, settings, model_inputs(section))
 
 
-def prepare(*, machine: Machine, shape: Shape, spring: Path, sections: dict[str, Path]) -> Work:
+def prepare(
+    *, machine: PlanarMachine, shape: Shape, spring: Path, sections: dict[str, Path]
+) -> Work:
     """Solve the sample."""
     return whole(_shape, machine=machine, shape=shape, spring=spring)
 
 
-def _shape(machine: Machine, shape: Shape, spring: Path) -> dict[str, Writer]:
+def _shape(machine: PlanarMachine, shape: Shape, spring: Path) -> dict[str, Writer]:
     crane = flexible(machine, spring)
-    solved = equilibrium(crane, shape.strokes, shape.payload)
-    unloaded = reference_shapes(crane, shape.strokes)
+    unloaded, bent = shapes(crane, np.array(shape.strokes), shape.payload)
     drawn = {
         "strokes": shape.strokes,
         "payload": shape.payload,
         "exaggeration": shape.exaggeration,
-        "beams": {name: _rounded(nodes) for name, nodes in solved.shapes.items()},
+        "beams": {name: _rounded(nodes) for name, nodes in bent.items()},
         "reference": {name: _rounded(nodes) for name, nodes in unloaded.items()},
-        "tip": _rounded(solved.tip),
+        "tip": _rounded(bent["extension"][-1]),
         "rigid_tip": _rounded(forward(crane.geometry, np.array([shape.strokes]))[0]),
     }
     return {".json": json_file(drawn)}

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.cases.crane.parts.crane import flexible, model_inputs
+from flexik.cases.crane.parts.crane import FlexibleCrane, flexible, model_inputs
 from flexik.cases.crane.parts.fields import TARGET_FIELDS
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part, Work, Writer, stacked, table
@@ -16,9 +16,9 @@ from flexik.evaluation.conditions import Array
 from flexik.evaluation.targets import draw_candidates, reachable_targets
 from flexik.kinematics.crane import smallest_extension
 from flexik.kinematics.crane_manipulator import CraneManipulator
-from flexik.machines.crane import Machine
-from flexik.multibody.crane.model import solve
-from flexik.multibody.crane.structure import FlexibleCrane
+from flexik.kinematics.machine_file import crane_geometry
+from flexik.machines.planar import PlanarMachine
+from flexik.multibody.planar import solve
 from flexik.parameters.conditions import RandomTargets
 
 ROWS = 400
@@ -40,7 +40,7 @@ def parts(section: Section) -> list[Part]:
 
 def prepare(
     *,
-    machine: Machine,
+    machine: PlanarMachine,
     minimum_x: float,
     name: str,
     random: RandomTargets,
@@ -52,7 +52,7 @@ def prepare(
     n, generator = MAXIMUM_CANDIDATES * random.n_targets, np.random.default_rng(random.seed)
     drawn = np.column_stack(draw_candidates(n, lower, upper, random.payload, generator))
     drawn = drawn[drawn[:, 0] >= minimum_x]
-    drawn = drawn[~np.isnan(smallest_extension(machine.geometry, drawn[:, :2]))]
+    drawn = drawn[~np.isnan(smallest_extension(crane_geometry(machine), drawn[:, :2]))]
     first = round(TRIED * random.n_targets)
     tried, others = drawn[:first], drawn[first:]
     reach = functools.partial(_reach, flexible(machine, spring), random)

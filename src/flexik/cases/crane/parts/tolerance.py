@@ -16,8 +16,8 @@ from flexik.evaluation.conditions import Conditions
 from flexik.evaluation.errors import Judge, evaluate, tip_judge
 from flexik.evaluation.tolerance import FIELDS, tolerance_row
 from flexik.kinematics.crane_manipulator import CraneManipulator
-from flexik.machines.crane import Machine
-from flexik.multibody.crane.model import tips
+from flexik.machines.planar import PlanarMachine
+from flexik.multibody.planar import tips
 from flexik.parameters.conditions import Points
 from flexik.positioning.method import Columns, Method
 
@@ -37,7 +37,7 @@ def part(section: Section) -> Part:
 
 def prepare(
     *,
-    machine: Machine,
+    machine: PlanarMachine,
     tolerances: list[float],
     points: Points,
     methods: dict[str, dict[str, Any]],

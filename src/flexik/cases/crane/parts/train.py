@@ -8,13 +8,13 @@ from typing import Any
 from flexik.cases.crane.parts.learning import KINDS, lesson
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part, Work
+from flexik.kinematics.crane import CraneGeometry
 from flexik.learning.fit import fit
 from flexik.learning.modular import combine
 from flexik.learning.perceptron import Network, quantities
 from flexik.learning.size_selection import read_layers
 from flexik.learning.storage import load_network
 from flexik.learning.training import Architecture
-from flexik.machines.crane import CraneGeometry
 from flexik.parameters.trainers import Stopping
 
 
@@ -44,7 +44,7 @@ def described(section: Section, name: str) -> dict[str, Any]:
     """Settings of what network `name` learns."""
     network = section.networks[name]
     return {
-        "geometry": section.machine.geometry,
+        "geometry": section.geometry,
         "kind": network.learns or "correction",
         "seed": network.seed,
     }

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from flexik.cases.crane.measured_section import Adaptation, Campaign
-from flexik.cases.crane.parts.crane import flexible
+from flexik.cases.crane.parts.crane import FlexibleCrane, flexible
 from flexik.cases.crane.parts.measured.adapted import Adapted, Measurements, identify, misjudged
 from flexik.cases.crane.parts.measured.fields import ADAPTATION, ADAPTED, MISJUDGED
 from flexik.cases.crane.parts.measured.nominal import compensating, read_network
@@ -16,11 +16,10 @@ from flexik.cases.crane.parts.measured.twins import Generator, measured_tips, tw
 from flexik.datasets.parts import Columns, Work, rows, stacked
 from flexik.errors import ParameterError
 from flexik.evaluation.targets import draw_candidates
-from flexik.kinematics.crane import smallest_extension
+from flexik.kinematics.crane import CraneGeometry, smallest_extension
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.status import REACHED
-from flexik.machines.crane import CraneGeometry, Machine
-from flexik.multibody.crane.structure import FlexibleCrane
+from flexik.machines.planar import PlanarMachine
 from flexik.positioning import combined
 from flexik.positioning.method import Array, Method, Network, PositioningError
 
@@ -48,7 +47,7 @@ class Study:
 
 def prepare(
     *,
-    machine: Machine,
+    machine: PlanarMachine,
     campaign: Campaign,
     adaptation: Adaptation,
     methods: Mapping[str, combined.Settings],

@@ -6,20 +6,26 @@ stay at what an engineer expects, so three points already help and more only hel
 Rouvinen 1999, who met these differences in chapter 4.6.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from flexik.cases.crane.measured_section import Expected
-from flexik.kinematics.crane import forward
+from flexik.cases.crane.parts.crane import FlexibleCrane
+from flexik.kinematics.crane import CraneGeometry, forward
 from flexik.kinematics.crane_dimensions import DIMENSIONS, LENGTHS, corrected
 from flexik.kinematics.crane_manipulator import CraneManipulator
-from flexik.machines.crane import CraneGeometry
-from flexik.multibody.crane.statics import JOINTS, compliance
-from flexik.multibody.crane.structure import FlexibleCrane
+from flexik.multibody.joint_forces import compliance
 from flexik.positioning.combined import Combined
 from flexik.positioning.method import Answer, Array, Network, PositioningError, checked
 
+# How many pins there are, by name of the joint or drive; as multibody.joint_forces.pins_of has them
+JOINTS = {
+    **dict.fromkeys(("lift_pivot", "jib_pivot", "rocker_pivot", "rocker_head", "coupler_pin"), 1),
+    "lift": 2,
+    "jib": 2,
+}
 PLAYS = tuple(f"play_{joint}" for joint in JOINTS)
 FACTORS = ("deflection", "spring")
 OFFSETS = (*DIMENSIONS, *PLAYS, *FACTORS)
@@ -119,10 +125,13 @@ class CorrectedDeflection:
     network: Network
     offsets: Offsets
 
+    @cached_property
+    def _known(self) -> FlexibleCrane:
+        return self.crane.like(self.offsets.geometry(self.crane.geometry))
+
     def predict(self, values: Array) -> Array:
         """Displacement (n, 2) in m at `values` (n, 4): strokes in m and payload in kg."""
-        known = replace(self.crane, geometry=self.offsets.geometry(self.crane.geometry))
-        share, fixed = displacements(known, self.network, values[:, :3], values[:, 3])
+        share, fixed = displacements(self._known, self.network, values[:, :3], values[:, 3])
         return fixed + share @ self.offsets.values[N_DIMENSIONS:]
 
 
@@ -199,7 +208,7 @@ def surprise(
         offsets = Offsets(expected, np.diag(deviation**2))
     strokes, payload = measurements.strokes, measurements.payload
     residual = measurements.tip - predicted_tip(crane, network, offsets, strokes, payload)
-    known = replace(crane, geometry=offsets.geometry(crane.geometry))
+    known = crane.like(offsets.geometry(crane.geometry))
     share, _ = displacements(known, network, strokes, payload)
     slopes = np.concatenate(
         [slope(crane.geometry, offsets.values[:N_DIMENSIONS], strokes), share], axis=2
@@ -221,7 +230,7 @@ def _most_probable(
     """Offsets with the joint forces of the offsets `start`."""
     expected, deviation = prior(settings)
     strokes = measurements.strokes
-    known = replace(crane, geometry=start.geometry(crane.geometry))
+    known = crane.like(start.geometry(crane.geometry))
     share, fixed = displacements(known, network, strokes, measurements.payload)
     white = whitening(known, measurements, settings)
     offsets = start.values
@@ -252,7 +261,7 @@ def displacements(
     """Displacement (n, 2, 8) per unit of PLAYS and FACTORS, and the nominal one (n, 2)."""
     inputs = np.column_stack([strokes, payload])
     deflection = checked("predicted deflection", network.predict(inputs), len(inputs), 2)
-    play, spring = compliance(crane, strokes, payload)
+    play, spring = compliance(crane.machine, crane.linkage.poses(strokes), payload)
     return np.concatenate([play, deflection[..., None], spring[..., None]], axis=2), deflection
 
 
@@ -293,7 +302,10 @@ def whitening(crane: FlexibleCrane, measurements: Measurements, settings: Expect
     doubt = np.array([0.0, np.hypot(settings.length, settings.stroke_offset), 0.0])
     for shifted in (strokes - doubt, strokes + doubt):
         closed_tip(crane.geometry, shifted)
-    less, more = (compliance(crane, strokes + d, payload).play.sum(axis=2) for d in (-doubt, doubt))
+    less, more = (
+        compliance(crane.machine, crane.linkage.poses(strokes + d), payload).play.sum(axis=2)
+        for d in (-doubt, doubt)
+    )
     scatter = np.concatenate([by_stroke, settings.play * (more - less)[..., None] / 2], axis=2)
     covariance = scatter @ scatter.transpose(0, 2, 1) + settings.measurement**2 * np.eye(2)
     return np.linalg.inv(np.linalg.cholesky(covariance))

@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 
 from flexik.cases.crane.measured_section import Budget, Campaign
-from flexik.cases.crane.parts.crane import flexible
+from flexik.cases.crane.parts.crane import FlexibleCrane, flexible
 from flexik.cases.crane.parts.measured.errors import campaign_errors
 from flexik.cases.crane.parts.measured.fields import BUDGET, MEASURED
 from flexik.cases.crane.parts.measured.nominal import approaches, read_network
 from flexik.cases.crane.parts.measured.twins import measured_tips, twin_and_generator
 from flexik.datasets.parts import Columns, Work, Writer, stacked, table
 from flexik.learning.storage import load_restarts
-from flexik.machines.crane import Machine, Magnitudes
-from flexik.multibody.crane.structure import FlexibleCrane
+from flexik.machines.deviations import Magnitudes
+from flexik.machines.planar import PlanarMachine
 from flexik.positioning import combined
 from flexik.positioning.method import Array
 
@@ -45,7 +45,7 @@ class Item:
 
 def prepare(
     *,
-    machine: Machine,
+    machine: PlanarMachine,
     campaign: Campaign,
     budget: Budget,
     method: combined.Settings,

@@ -10,28 +10,28 @@ from pathlib import Path
 import numpy as np
 
 from flexik.cases.crane.measured_section import Campaign
-from flexik.cases.crane.parts.crane import flexible
+from flexik.cases.crane.parts.crane import FlexibleCrane, flexible
 from flexik.cases.crane.parts.measured.campaign_file import own_campaign
 from flexik.cases.crane.parts.measured.fields import CAMPAIGN
 from flexik.cases.crane.parts.measured.nominal import approaches, read_network
 from flexik.cases.crane.parts.measured.twins import measured_tips, twin_and_generator
 from flexik.datasets.parts import Work, Writer, table, whole
-from flexik.machines.crane import Machine
-from flexik.multibody.crane.structure import FlexibleCrane
+from flexik.kinematics.machine_file import crane_geometry
+from flexik.machines.planar import PlanarMachine
 from flexik.positioning import combined
 from flexik.positioning.method import Array
 
 
-def prepare_own(*, machine: Machine, file: Path) -> Work:
+def prepare_own(*, machine: PlanarMachine, file: Path) -> Work:
     """The campaign of `file`."""
-    found = own_campaign(file, machine.geometry)
+    found = own_campaign(file, crane_geometry(machine))
     columns = {field.name: found[field.name].to_numpy() for field in CAMPAIGN}
     return whole(written, columns=columns)
 
 
 def prepare(
     *,
-    machine: Machine,
+    machine: PlanarMachine,
     campaign: Campaign,
     method: combined.Settings,
     network: Path,

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 from flexik.cases.crane.parts.measured.errors import REFERENCE_METHOD, REFERENCE_PAYLOAD
 from flexik.cases.crane.parts.measured.fields import CAMPAIGN, MEASURED, METHODS, STROKES, TARGET
 from flexik.errors import DataError
-from flexik.kinematics.crane import forward, smallest_extension
-from flexik.machines.crane import CraneGeometry
+from flexik.kinematics.crane import CraneGeometry, forward, smallest_extension
 
 Rows = list[tuple[int, list[str]]]  # line numbers and cells
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 
 from flexik.cases.crane.measured_section import Expected
-from flexik.cases.crane.parts.crane import flexible
+from flexik.cases.crane.parts.crane import FlexibleCrane, flexible
 from flexik.cases.crane.parts.measured.adapted import (
     FACTORS,
     FEWEST,
@@ -33,15 +33,14 @@ from flexik.cases.crane.parts.measured.predictions import measurements, predicti
 from flexik.datasets.parts import Work, Writer, stacked, table, whole
 from flexik.datasets.tables import Field, read_table
 from flexik.kinematics.crane_manipulator import CraneManipulator
-from flexik.machines.crane import Machine
-from flexik.multibody.crane.structure import FlexibleCrane
+from flexik.machines.planar import PlanarMachine
 from flexik.positioning import combined
 from flexik.positioning.method import Method, Network
 
 
 def prepare(
     *,
-    machine: Machine,
+    machine: PlanarMachine,
     expected: Expected,
     n_corrections: int,
     method: combined.Settings,

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from flexik.cases.crane.measured_section import Campaign
+from flexik.cases.crane.parts.crane import FlexibleCrane
 from flexik.evaluation.conditions import every
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.learning.storage import load_network
-from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning import combined
 from flexik.positioning.method import Array, Ingredients, Method, Network
 from flexik.positioning.none import Uncompensated

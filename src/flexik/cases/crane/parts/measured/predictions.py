@@ -5,6 +5,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from flexik.cases.crane.measured_section import Expected
+from flexik.cases.crane.parts.crane import FlexibleCrane
 from flexik.cases.crane.parts.measured.adapted import (
     FEWEST,
     Measurements,
@@ -13,7 +14,6 @@ from flexik.cases.crane.parts.measured.adapted import (
     surprise,
 )
 from flexik.cases.crane.parts.measured.fields import MEASURED, STROKES, TARGET
-from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning.method import Array, Network
 
 # Standard deviations beyond which a measurement is left out

@@ -5,14 +5,14 @@ from typing import TypeVar
 
 import numpy as np
 
-from flexik.machines.crane import Magnitudes
-from flexik.multibody.crane.as_built import (
-    AsBuiltCrane,
+from flexik.cases.crane.parts.crane import FlexibleCrane
+from flexik.machines.deviations import Magnitudes
+from flexik.multibody.as_built import (
+    AsBuilt,
     actual_strokes,
     draw_twin,
     settled_tips,
 )
-from flexik.multibody.crane.structure import FlexibleCrane
 from flexik.positioning.method import Array
 
 Generator = np.random.Generator
@@ -21,13 +21,13 @@ Name = TypeVar("Name", bound=Hashable)
 
 def twin_and_generator(
     nominal: FlexibleCrane, magnitudes: Magnitudes, seed: int
-) -> tuple[AsBuiltCrane, Generator]:
+) -> tuple[AsBuilt, Generator]:
     """The crane that `seed` draws around the `nominal` one, and what draws its approaches."""
     return draw_twin(nominal, magnitudes, seed), np.random.default_rng((seed, 1))
 
 
 def measured_tips(
-    twin: AsBuiltCrane,
+    twin: AsBuilt,
     strokes: Mapping[Name, Array],
     payload: Array,
     noise: float | None,

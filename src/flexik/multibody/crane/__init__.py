@@ -1,1 +1,0 @@
-"""The flexible crane, nominal and as built."""
