@@ -77,13 +77,16 @@ $(VENV)/.python:
 	done; \
 	echo "error: $(or $(PYTHON),the PATH) has no Python 3.11 to 3.14 with venv; name one with PYTHON=..." >&2; exit 1
 
+# the command flexik runs the src of the folder it is called in, as the stages do
 $(VENV)/.pipeline: $(VENV)/.python pyproject.toml constraints.txt
 	$(call INSTALL)
+	@printf '#!%s\nimport sys\nsys.path.insert(0, "src")\nfrom flexik.__main__ import main\nmain()\n' \
+	  $(CURDIR)/$(BIN)/python > $(BIN)/flexik && chmod +x $(BIN)/flexik
 	@touch $@
 
-$(VENV)/.dev: $(VENV)/.python pyproject.toml constraints.txt
+$(VENV)/.dev: $(VENV)/.pipeline
 	$(call INSTALL,dev dask)
-	@touch $(VENV)/.pipeline $@
+	@touch $@
 
 $(VENV)/.benchmark: $(VENV)/.dev
 	$(call INSTALL,benchmark)

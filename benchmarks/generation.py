@@ -25,6 +25,7 @@ import numpy as np
 import pandas as pd
 from generation_runs import (
     TIPS,
+    Asked,
     flexik_tips,
     generated,
     grid,
@@ -36,12 +37,12 @@ from joblib.externals.loky import get_reusable_executor
 from threadpoolctl import threadpool_limits
 
 from flexik import stage
-from flexik.cases.crane.parts.fields import INPUTS, KEPT
-from flexik.cases.crane.section import Grid
+from flexik.cases.case import load
 from flexik.errors import FlexikError
 from flexik.files import write_json
 from flexik.kinematics.manipulator import Array
 from flexik.multibody.model import PlanarModel
+from flexik.planar.fields import KEPT, inputs
 from flexik.reporting.tables import Table
 
 OUTPUT = Path("reports/benchmarks/generate")
@@ -56,7 +57,7 @@ PUBLISHED_SAMPLES, PUBLISHED_SECONDS = 4000, 25 * 60.0
 
 # By name in the .json: a name for people, the number of processes and the function. The order
 # counts: flexik_cold starts the worker processes, which flexik_2 finds
-WAYS: dict[str, tuple[str, int, Callable[[Grid, int], Array]]] = {
+WAYS: dict[str, tuple[str, int, Callable[[Asked, int], Array]]] = {
     "flexik_1": ("flexik", 1, flexik_tips),
     "variation_1": ("(a) ParameterVariation", 1, parameter_variation),
     "flexik_cold": ("flexik, processes started anew", N_PROCESSES, flexik_tips),
@@ -77,7 +78,7 @@ COLUMNS = {
 }
 
 
-def measure_speed(asked: Grid, n_repeats: int) -> dict[str, float]:
+def measure_speed(asked: Asked, n_repeats: int) -> dict[str, float]:
     """Medians over `n_repeats` of all ways, flat; raises FlexikError if their tips differ."""
     table = generated(asked, 1)
     expected, n, worst = table[TIPS].to_numpy(), int((table["status"] == KEPT).sum()), 0.0
@@ -123,7 +124,9 @@ def largest_difference(name: str, tips: Array, expected: Array) -> float:
 
 def measure_steps(table: pd.DataFrame, n_vectors: int = 200) -> dict[str, float]:
     """Where (a) spends its time: median milliseconds to build, place and solve a model."""
-    rows = table.loc[table["status"] == KEPT, list(INPUTS)].sample(n_vectors, random_state=0)
+    rows = table.loc[table["status"] == KEPT, inputs(load("crane").machine)].sample(
+        n_vectors, random_state=0
+    )
     times = []
     for *strokes, payload in rows.to_numpy():
         values, crane = np.array(strokes), model()

@@ -24,10 +24,7 @@ import pandas as pd
 from exudyn.processing import ParameterVariation
 
 from flexik.cases.case import load
-from flexik.cases.crane.parts.crane import FlexibleCrane, flexible, model_inputs
-from flexik.cases.crane.parts.fields import SAMPLE_FIELDS
-from flexik.cases.crane.parts.samples import GridParts, axis, counts, parts
-from flexik.cases.crane.section import Grid
+from flexik.cases.crane.parts.crane import FlexibleCrane, flexible
 from flexik.datasets import parallel
 from flexik.datasets.parts import Part, make
 from flexik.datasets.tables import read_table
@@ -35,6 +32,10 @@ from flexik.errors import SolverError
 from flexik.kinematics.crane import forward
 from flexik.kinematics.manipulator import Array
 from flexik.multibody.model import PlanarModel
+from flexik.parameters.networks import Axis
+from flexik.planar.fields import sample_fields
+from flexik.planar.machine import model_inputs
+from flexik.planar.samples import axis, counts, parts
 
 # Values on the axes: 4050 vectors as in table 4.1, ten times and 100 times as many
 SMALL = {"lift": 9, "jib": 9, "extension": 5, "payload": 10}
@@ -42,24 +43,27 @@ TEN_TIMES = {"lift": 18, "jib": 18, "extension": 5, "payload": 25}
 HUNDRED_TIMES = {"lift": 18, "jib": 18, "extension": 50, "payload": 25}
 TIPS = ["tip_x", "tip_y"]
 
+# A grid of samples, axes by name
+Asked = dict[str, Axis]
+
 
 @functools.cache
 def model() -> FlexibleCrane:
     """Return the crane of params.yaml on the calibrated spring, read once a process."""
     section = load("crane")
-    return flexible(section.machine, model_inputs(section)["spring"])
+    return flexible(section.machine, model_inputs(section)["constants"])
 
 
-def grid(n_values: Mapping[str, int]) -> Grid:
+def grid(n_values: Mapping[str, int]) -> Asked:
     """Return the grid of params.yaml, its ranges cut into `n_values` by name of the axis."""
     given = load("crane").samples.grid
-    axes = {name: getattr(given, name) for name in n_values}
+    axes = {name: given[name] for name in n_values}
     steps = {k: (axes[k].maximum - axes[k].minimum) / (n - 1) for k, n in n_values.items()}
     cut = {name: axes[name].model_copy(update={"increment": step}) for name, step in steps.items()}
-    return given.model_copy(update=cut)
+    return given | cut
 
 
-def generated(asked: Grid, n_processes: int) -> pd.DataFrame:
+def generated(asked: Asked, n_processes: int) -> pd.DataFrame:
     """Table of the pipeline's part `grid` for the grid `asked`, written and read back."""
     part = next(part for part in parts(load("crane")) if part.name == "grid")
     part = Part(part.name, part.prepare, {**part.settings, "drawn": asked}, part.inputs)
@@ -69,21 +73,23 @@ def generated(asked: Grid, n_processes: int) -> pd.DataFrame:
         patch.object(parallel, "START_SECONDS", 0.0),
     ):
         make(folder, [part], parallel.ParallelSettings(n_processes))
-        return read_table(Path(folder) / f"{part.name}.parquet", SAMPLE_FIELDS)
+        return read_table(
+            Path(folder) / f"{part.name}.parquet", sample_fields(load("crane").machine)
+        )
 
 
-def flexik_tips(asked: Grid, n_processes: int) -> Array:
+def flexik_tips(asked: Asked, n_processes: int) -> Array:
     """Tips (n, 2) in m by this package."""
     return generated(asked, n_processes)[TIPS].to_numpy()
 
 
-def parameter_variation(asked: Grid, n_processes: int) -> Array:
+def parameter_variation(asked: Asked, n_processes: int) -> Array:
     """Tips (n, 2) in m by Exudyn's processing, in the order of `flexik_tips`."""
     # extension slowest, payload fastest: the last parameter varies first
     order = ("extension", "lift", "jib", "payload")
     _, values = ParameterVariation(
         one_model_per_vector,
-        {name: axis(**dict(getattr(asked, name))).tolist() for name in order},
+        {name: axis(**dict(asked[name])).tolist() for name in order},
         useMultiProcessing=n_processes > 1,
         numberOfThreads=n_processes,
         showProgress=False,
@@ -119,7 +125,7 @@ def measure_memory(n_processes: int, quick: bool) -> dict[str, float]:
     return figures
 
 
-def what_it_took(asked: Grid, n_processes: int) -> dict[str, float]:
+def what_it_took(asked: Asked, n_processes: int) -> dict[str, float]:
     """Counts, seconds and peaks in MB of generating one grid in this process and others."""
     start = time.perf_counter()
     found = counts(generated(asked, n_processes))
@@ -136,5 +142,5 @@ def what_it_took(asked: Grid, n_processes: int) -> dict[str, float]:
 
 if __name__ == "__main__":
     *n_values, n_processes = map(int, sys.argv[1:])
-    asked = grid(dict(zip(GridParts.AXES, n_values, strict=True)))
+    asked = grid(dict(zip([*load("crane").machine.drives, "payload"], n_values, strict=True)))
     print(json.dumps(what_it_took(asked, n_processes)))

@@ -21,14 +21,14 @@ import pandas as pd
 
 from flexik import stage
 from flexik.cases.case import load
-from flexik.cases.crane.parts.conditions import at, at_points
-from flexik.cases.crane.parts.fields import TARGET_FIELDS
-from flexik.cases.crane.parts.methods import method_of
 from flexik.cases.crane.report_results import query_key
 from flexik.datasets.tables import read_table
 from flexik.errors import DataError
 from flexik.evaluation.conditions import Conditions
 from flexik.kinematics.crane_manipulator import CraneManipulator
+from flexik.planar.conditions import at, at_points
+from flexik.planar.fields import QUERY, target_fields
+from flexik.planar.methods import method_of
 from flexik.positioning.method import Method
 from flexik.reporting.tables import Table
 
@@ -54,11 +54,13 @@ def cases() -> dict[str, Case]:
     section = load("crane")
     manipulator = CraneManipulator(section.geometry)
     try:
-        table = read_table(section.data / "samples/workspace.parquet", TARGET_FIELDS)
+        table = read_table(
+            section.data / "samples/workspace.parquet", target_fields(section.machine)
+        )
         methods = {name: method_of(section, name) for name in section.methods}
     except DataError as error:
         raise DataError(f"run `make repro` first: {error}") from error
-    queries = table[[field.name for field in TARGET_FIELDS[:3]]].to_numpy()
+    queries = table[[field.name for field in QUERY]].to_numpy()
     batch = at(queries, np.arange(len(queries)), manipulator)
     single = at_points(section.conditions["published"], manipulator)
     return {

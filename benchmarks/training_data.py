@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexik.cases.case import load
-from flexik.cases.crane.parts.learning import lesson
-from flexik.cases.crane.parts.train import data_inputs
 from flexik.learning.perceptron import Network, Normalisation, Quantity
 from flexik.learning.problem import Problem, problem
 from flexik.learning.training import Architecture, Lesson, train
 from flexik.learning.weights import Weights, initial_weights
 from flexik.parameters.trainers import LevenbergMarquardt, LevenbergMarquardtAccelerated, Stopping
+from flexik.planar.learning import lesson
+from flexik.planar.train import data_inputs
 
 Array = NDArray[np.float64]
 
@@ -37,9 +37,10 @@ def crane_lesson(network: str) -> Lesson:
     Raises DataError when the pipeline has not made them.
     """
     section = load("crane")
-    geometry = section.geometry
     architecture = Architecture(1, ACTIVATION)
-    return lesson(NETWORKS[network], architecture, OURS(), SEED, geometry, **data_inputs(section))
+    return lesson(
+        NETWORKS[network], architecture, OURS(), SEED, section.machine, **data_inputs(section)
+    )
 
 
 def columns(n: int) -> list[Quantity]:

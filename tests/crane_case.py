@@ -8,9 +8,10 @@ import pandas as pd
 
 from flexik.cases.case import load
 from flexik.cases.crane.parts.crane import on_spring
-from flexik.cases.crane.parts.fields import SAMPLE_FIELDS
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.machines.deviations import Magnitudes
+from flexik.planar.fields import inputs, sample_fields, target_fields
+from flexik.planar.learning import kind_of
 
 ROOT = Path(__file__).parents[1]
 SPRING = 8e6  # N m/rad
@@ -38,6 +39,11 @@ def samples(columns):
 
 
 MANIPULATOR = CraneManipulator(section().geometry)
+MACHINE = section().machine
+SAMPLE_FIELDS, TARGET_FIELDS = sample_fields(MACHINE), target_fields(MACHINE)
+INPUTS = inputs(MACHINE)
+NAMES = ("deflection", "tip", "rigid_tip", "correction", "coordinates")
+KINDS = {name: kind_of(MACHINE, name) for name in NAMES}
 
 
 def magnitudes(*sizes):

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from flexik.cases.crane.parts import calibrate
-from flexik.cases.crane.section import Calibration
+from flexik.cases.crane.section import SPRING, Calibration
 from flexik.datasets.parts import key
 from flexik.errors import ParameterError
 from flexik.evaluation.calibration import fit_spring
@@ -91,11 +91,11 @@ def test_the_crane_is_calibrated_on_conditions_of_its_own(tmp_path, monkeypatch)
     monkeypatch.chdir(crane_case.ROOT)
     conditions = {"points": [[5.0, 2.0], [4.0, 1.0]], "payloads": [120.0, 470.0]}
     found = spring(Calibration.model_validate({"conditions": conditions}), tmp_path)
-    assert 2e6 < found["spring_stiffness"] < 2e7
+    assert 2e6 < found["constants"][SPRING] < 2e7
     assert found["uncompensated"]["mean_error"] == pytest.approx(0.04, rel=1e-5)
     assert found["uncompensated"]["n_conditions"] == 4
     known = spring(Calibration(stiffness=8.5e6), tmp_path)
-    assert known == {"spring_stiffness": 8.5e6}
+    assert known == {"constants": {SPRING: 8.5e6}}
 
 
 def test_test_conditions_do_not_change_the_machine(monkeypatch):

@@ -5,11 +5,10 @@ import shutil
 import crane_case
 import numpy as np
 import pytest
+from crane_case import KINDS, TARGET_FIELDS
 
-from flexik.cases.crane.parts import evaluate, tolerance
-from flexik.cases.crane.parts.fields import TARGET_FIELDS
-from flexik.cases.crane.parts.learning import KINDS
-from flexik.cases.crane.parts.methods import method_of
+from flexik.cases.crane.parts import tolerance
+from flexik.cases.crane.section import SPRING
 from flexik.datasets.parallel import ParallelSettings
 from flexik.datasets.parts import key, make
 from flexik.datasets.tables import read_table, write_table
@@ -20,6 +19,8 @@ from flexik.learning.perceptron import Network, Normalisation, quantities
 from flexik.learning.stopping import StopReason
 from flexik.learning.storage import network_file
 from flexik.learning.training import TrainingRecord
+from flexik.planar import evaluate
+from flexik.planar.methods import method_of
 from flexik.positioning.combined import Combined
 from flexik.positioning.inversion import GaussNewton
 
@@ -54,7 +55,7 @@ def network_of(learns, seed):
 def project(tmp_path, monkeypatch):
     """Folder with targets and networks that never learnt anything, and few conditions."""
     shutil.copytree(crane_case.ROOT / "data/reference/crane", tmp_path / "data/reference/crane")
-    write_json(tmp_path / "data/crane/constants/spring.json", {"spring_stiffness": 8e6})
+    write_json(tmp_path / "data/crane/constants/constants.json", {"constants": {SPRING: 8e6}})
     targets = np.array([[4.0, 1.0, 100.0], [3.0, 2.0, 300.0], [5.0, 0.0, 50.0]])
     columns = dict(
         zip((f.name for f in TARGET_FIELDS), [*targets.T, *np.zeros((3, 3))], strict=True)

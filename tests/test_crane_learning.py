@@ -4,20 +4,16 @@ import crane_case
 import numpy as np
 import pandas as pd
 import pytest
+from crane_case import KINDS, MACHINE, SAMPLE_FIELDS
 
-from flexik.cases.crane.parts.fields import FAILED, KEPT, LEFT_OUT, SAMPLE_FIELDS, on_line
-from flexik.cases.crane.parts.learning import (
-    KINDS,
-    correction,
-    learnt_rows,
-    lesson,
-    on_branch,
-    stroke_error_at_tip,
-)
+from flexik.cases.crane.parts.fields import on_line
 from flexik.datasets.tables import write_table
 from flexik.kinematics.crane import forward, inverse
+from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.learning.training import Architecture
 from flexik.parameters.trainers import LevenbergMarquardt
+from flexik.planar.fields import FAILED, KEPT, LEFT_OUT
+from flexik.planar.learning import correction, error_at_tip, learnt_rows, lesson, on_branch
 
 # Lift, jib, extension (m), payload (kg), deflection x, y (m), status
 ROWS = np.array(
@@ -68,7 +64,7 @@ def learn(geometry, tmp_path_factory):
             Architecture(1),
             LevenbergMarquardt(),
             7,
-            geometry,
+            MACHINE,
             folder / "grid.parquet",
             folder / "selection.parquet",
             Linear() if kind == "correction" else None,
@@ -150,7 +146,9 @@ def test_the_error_at_the_tip_is_a_mean_over_samples_and_axes(geometry):
     moved = forward(geometry, np.array([[0.21, 0.3, 0.8]])) - forward(
         geometry, np.array([[0.2, 0.3, 0.8]])
     )
-    error = stroke_error_at_tip(geometry, inputs, strokes, np.array([2.0, 4.0]), Strokes(found))
+    error = error_at_tip(
+        CraneManipulator(geometry), inputs, strokes, np.array([2.0, 4.0]), Strokes(found)
+    )
     squares = (moved[0] / [2.0, 4.0]) ** 2
     assert error == pytest.approx(np.sqrt(squares.sum() / 4), rel=1e-12)
 
@@ -178,7 +176,7 @@ def test_all_kinds_are_tested_and_name_their_columns():
 
 def test_poses_on_the_branch_are_those_the_rigid_inverse_takes(geometry):
     table = table_of(ROWS, geometry)
-    found = on_branch(table, geometry)
+    found = on_branch(table, MACHINE)
     assert found.tolist() == [True, True, True, True, False, True, True, False, True]
     # those that are not have a tip that other strokes have too
     for strokes in table.loc[~found, ["lift_stroke", "jib_stroke", "extension_stroke"]].to_numpy():
@@ -192,7 +190,7 @@ def test_poses_on_the_branch_are_those_the_rigid_inverse_takes(geometry):
 def test_rows_learnt_are_whole_rows_of_the_table(geometry):
     table = table_of(USED, geometry)
     for kind, (rows, _) in LEARNT.items():
-        found = learnt_rows(table, kind, geometry)
+        found = learnt_rows(table, kind, MACHINE)
         assert np.array_equal(found, table_of(rows, geometry)), kind
     assert len(table) == len(USED)
 
@@ -201,7 +199,7 @@ def test_a_correction_is_what_the_network_lacks_of_the_tip(geometry):
     table = table_of(USED, geometry)
     strokes = USED[:, :3]
     tip = forward(geometry, strokes) + USED[:, 4:6]
-    left = correction(table, Linear())
+    left = correction(table, MACHINE, Linear())
     assert np.array_equal(left, tip - Linear().predict(strokes))
     assert Linear().predict(strokes) + left == pytest.approx(tip, abs=1e-14)
 

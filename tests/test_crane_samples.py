@@ -7,22 +7,22 @@ import crane_case
 import numpy as np
 import pandas as pd
 import pytest
+from crane_case import INPUTS, SAMPLE_FIELDS, TARGET_FIELDS
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flexik.cases.crane.parts import samples as module
-from flexik.cases.crane.parts import targets
-from flexik.cases.crane.parts.fields import (
-    FAILED,
-    INPUTS,
-    KEPT,
-    LEFT_OUT,
-    SAMPLE_FIELDS,
-    TARGET_FIELDS,
-    deflection,
-    kept,
-)
-from flexik.cases.crane.parts.samples import (
+from flexik.cases.crane.section import SPRING
+from flexik.datasets.parallel import ParallelSettings
+from flexik.datasets.parts import make
+from flexik.datasets.tables import read_table
+from flexik.errors import FlexikError, ParameterError, SolverError
+from flexik.files import write_json
+from flexik.kinematics.crane import forward
+from flexik.multibody.planar import tips
+from flexik.planar import samples as module
+from flexik.planar import targets
+from flexik.planar.fields import FAILED, KEPT, LEFT_OUT, deflection, kept
+from flexik.planar.samples import (
     POSES_PER_PART,
     GridParts,
     Samples,
@@ -33,13 +33,6 @@ from flexik.cases.crane.parts.samples import (
     solve_samples,
     split,
 )
-from flexik.datasets.parallel import ParallelSettings
-from flexik.datasets.parts import make
-from flexik.datasets.tables import read_table
-from flexik.errors import FlexikError, ParameterError, SolverError
-from flexik.files import write_json
-from flexik.kinematics.crane import forward
-from flexik.multibody.planar import tips
 
 
 @pytest.fixture(scope="module")
@@ -70,9 +63,9 @@ def lengths():
 def test_parts_are_the_full_factorial_once_in_order(n):
     rng = np.random.default_rng(n)
     axes = [np.sort(rng.uniform(0, 1, k)) for k in n]
-    parts = GridParts(*axes)
+    parts = GridParts(tuple(axes), (False, False, True))
     listed = [parts[i] for i in range(len(parts))]
-    found = np.vstack([np.column_stack([p.strokes, p.payload]) for p in listed])
+    found = np.vstack([np.column_stack([p.values, p.payload]) for p in listed])
     lift, jib, extension, payload = axes
     # extension slowest, then lift, jib, payload fastest
     expected = [
@@ -81,7 +74,7 @@ def test_parts_are_the_full_factorial_once_in_order(n):
     assert np.array_equal(found, np.array(expected))
     assert parts.n_samples == len(expected)
     for part in listed:
-        assert len(set(part.strokes[:, 2])) == 1
+        assert len(set(part.values[:, 2])) == 1
         assert 0 < len(part) <= POSES_PER_PART * n[3]
     assert [len(p) for p in parts] == [len(p) for p in listed]  # iteration ends
     for outside in (len(parts), -1):
@@ -91,51 +84,53 @@ def test_parts_are_the_full_factorial_once_in_order(n):
 
 def test_a_grid_too_large_for_memory_is_cheap_until_asked_for():
     long = np.linspace(0, 1, 4000)
-    parts = GridParts(long, long, long, long)  # 2.6e14 samples
+    parts = GridParts((long, long, long, long), (False, False, True))  # 2.6e14 samples
     assert parts.n_samples == 4000**4
     assert len(parts) == 4000 * -(-(4000**2) // POSES_PER_PART)
     last = parts[len(parts) - 1]
-    assert last.strokes[-1].tolist() == [1, 1, 1]
+    assert last.values[-1].tolist() == [1, 1, 1]
     assert last.payload[-1] == 1
 
 
 def test_grid_of_the_thesis(geometry):
     grid = crane_case.section().samples.grid
-    parts = GridParts(**{n: axis(**dict(getattr(grid, n))) for n in GridParts.AXES})
+    parts = GridParts.of(crane_case.MACHINE, grid)
     assert parts.n_samples == 4050
-    tip = np.vstack([forward(geometry, part.strokes) for part in parts])
+    tip = np.vstack([forward(geometry, part.values) for part in parts])
     assert (tip[:, 0] >= 0.0).sum() == 3670
 
 
 def test_random_samples_fill_their_ranges(geometry):
-    samples = random_samples(geometry, 2000, (30.0, 500.0), 0.0, seed=1)
-    assert samples.strokes.shape == (2000, 3)
+    samples = random_samples(crane_case.MACHINE, 2000, (30.0, 500.0), 0.0, seed=1)
+    assert samples.values.shape == (2000, 3)
     assert len(samples) == 2000
-    assert (samples.strokes >= 0).all() and (samples.strokes <= geometry.stroke_maximum).all()
-    assert (forward(geometry, samples.strokes)[:, 0] >= 0).all()
+    assert (samples.values >= 0).all() and (samples.values <= geometry.stroke_maximum).all()
+    assert (forward(geometry, samples.values)[:, 0] >= 0).all()
     assert samples.payload.min() == pytest.approx(30, abs=2)
     assert samples.payload.max() == pytest.approx(500, abs=2)
     # uniform where every tip is in front: the payload's mean within five standard errors
     assert samples.payload.mean() == pytest.approx(265, abs=5 * 470 / np.sqrt(12 * 2000))
-    assert np.abs(np.corrcoef(samples.strokes[:, 2], samples.payload)[0, 1]) < 0.12
+    assert np.abs(np.corrcoef(samples.values[:, 2], samples.payload)[0, 1]) < 0.12
 
 
 def test_random_samples_follow_their_seed(geometry):
-    first, again, other = (random_samples(geometry, 50, (1.0, 2.0), 0.0, s) for s in (1, 1, 2))
-    assert np.array_equal(first.strokes, again.strokes)
+    first, again, other = (
+        random_samples(crane_case.MACHINE, 50, (1.0, 2.0), 0.0, s) for s in (1, 1, 2)
+    )
+    assert np.array_equal(first.values, again.values)
     assert np.array_equal(first.payload, again.payload)
-    assert not np.array_equal(first.strokes, other.strokes)
+    assert not np.array_equal(first.values, other.values)
 
 
 def test_a_limit_that_few_poses_keep_is_met_by_drawing_again(geometry):
-    samples = random_samples(geometry, 40, (1.0, 2.0), 6.0, seed=1)
-    assert len(samples.strokes) == len(samples.payload) == 40
-    assert (forward(geometry, samples.strokes)[:, 0] >= 6.0).all()
+    samples = random_samples(crane_case.MACHINE, 40, (1.0, 2.0), 6.0, seed=1)
+    assert len(samples.values) == len(samples.payload) == 40
+    assert (forward(geometry, samples.values)[:, 0] >= 6.0).all()
 
 
 def test_a_limit_that_no_pose_keeps_is_told(geometry):
     with pytest.raises(ParameterError, match=r"minimum_tip_x: .*9\.0 m"):
-        random_samples(geometry, 5, (1.0, 2.0), 9.0, seed=1)
+        random_samples(crane_case.MACHINE, 5, (1.0, 2.0), 9.0, seed=1)
 
 
 @given(st.integers(0, 25), st.integers(1, 12))
@@ -143,9 +138,7 @@ def test_split_keeps_all_rows_in_order(n, n_rows):
     samples = Samples(np.arange(3.0 * n).reshape(n, 3), np.arange(float(n)))
     parts = split(samples, n_rows)
     assert all(0 < len(part) <= n_rows for part in parts)
-    assert np.array_equal(
-        np.vstack([np.empty((0, 3)), *(p.strokes for p in parts)]), samples.strokes
-    )
+    assert np.array_equal(np.vstack([np.empty((0, 3)), *(p.values for p in parts)]), samples.values)
     assert np.array_equal(np.concatenate([[], *(p.payload for p in parts)]), samples.payload)
 
 
@@ -163,18 +156,20 @@ def test_every_sample_is_a_row_with_its_status(crane, mixed):
     assert list(columns) == [field.name for field in SAMPLE_FIELDS]
     table = pd.DataFrame(columns)
     assert table["status"].tolist() == [KEPT, LEFT_OUT, FAILED, KEPT, KEPT]
-    assert np.array_equal(table[list(INPUTS)], np.column_stack([mixed.strokes, mixed.payload]))
-    rigid = forward(crane.geometry, mixed.strokes)
+    assert np.array_equal(table[list(INPUTS)], np.column_stack([mixed.values, mixed.payload]))
+    rigid = forward(crane.geometry, mixed.values)
     assert np.array_equal(table[["rigid_x", "rigid_y"]], rigid)
     assert rigid[1, 0] < 0
     solved = table["status"] == KEPT
     found = table.loc[solved, ["tip_x", "tip_y"]].to_numpy()
-    alone = [tips(crane, mixed.strokes[[i]], mixed.payload[[i]])[0] for i in (0, 3, 4)]
+    alone = [tips(crane, mixed.values[[i]], mixed.payload[[i]])[0] for i in (0, 3, 4)]
     assert found == pytest.approx(np.array(alone), abs=2e-7)
     assert table.loc[~solved, ["tip_x", "tip_y"]].isna().all(axis=None)
     assert table.drop(columns=["tip_x", "tip_y"]).notna().all(axis=None)
     assert counts(table) == {"n_samples": 5, "n_kept": 3, "n_left_out": 1, "n_failed": 1}
-    assert failed_samples(table) == ["strokes (0.2, 0.1, 0.4) m with 1e+07 kg"]
+    assert failed_samples(crane_case.MACHINE, table) == [
+        "lift_stroke 0.2, jib_stroke 0.1, extension_stroke 0.4, payload 1e+07"
+    ]
     usable = kept(table)
     assert usable.index.tolist() == [0, 1, 2]
     assert usable["payload"].tolist() == [100, 200, 200]
@@ -191,14 +186,15 @@ def test_limit_of_the_tip_is_inclusive(crane):
 
 
 def test_no_failure_no_text():
-    assert failed_samples(pd.DataFrame({name: [0.0] for name in INPUTS} | {"status": [0]})) == []
+    table = pd.DataFrame({name: [0.0] for name in INPUTS} | {"status": [0]})
+    assert failed_samples(crane_case.MACHINE, table) == []
 
 
 @pytest.fixture(scope="module")
 def commanded(geometry):
     """Three extensions and one kept by chance, in no order, a sample twice."""
-    samples = random_samples(geometry, 7, (30.0, 500.0), 0.0, seed=3)
-    strokes, payload = samples.strokes.copy(), samples.payload.copy()
+    samples = random_samples(crane_case.MACHINE, 7, (30.0, 500.0), 0.0, seed=3)
+    strokes, payload = samples.values.copy(), samples.payload.copy()
     strokes[[0, 3, 5], 2], strokes[[1, 4], 2], strokes[[2], 2] = 0.8, 0.0, 1.6
     return np.vstack([strokes, strokes[3:4]]), np.append(payload, payload[3])
 
@@ -227,7 +223,7 @@ def test_strokes_that_do_not_assemble_fail_and_are_not_left_out(crane):
 def project(tmp_path, monkeypatch):
     """Folder with little more than a calibrated crane."""
     shutil.copytree(crane_case.ROOT / "data/reference/crane", tmp_path / "data/reference/crane")
-    write_json(tmp_path / "data/crane/constants/spring.json", {"spring_stiffness": 8e6})
+    write_json(tmp_path / "data/crane/constants/constants.json", {"constants": {SPRING: 8e6}})
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -236,10 +232,10 @@ def small(**changes):
     """Section with a small grid, and few targets with `changes`."""
     section = crane_case.section()
     axes = {
-        name: getattr(section.samples.grid, name).model_copy(update={"increment": step})
+        name: section.samples.grid[name].model_copy(update={"increment": step})
         for name, step in (("lift", 0.535), ("jib", 0.39), ("extension", 0.8), ("payload", 225.0))
     }
-    grid = section.samples.grid.model_copy(update=axes)
+    grid = section.samples.grid | axes
     selection = section.samples.selection.model_copy(update={"n_samples": 9})
     samples = section.samples.model_copy(update={"grid": grid, "selection": selection})
     random = section.conditions["workspace"].model_copy(update={"n_targets": 20, **changes})
@@ -277,7 +273,7 @@ def drawn(section):
     """Targets and payloads of set `workspace`."""
     (part,) = targets.parts(section)
     with contextlib.redirect_stdout(None):
-        work = part.prepare(**part.settings, spring=part.inputs["spring"], sections={})
+        work = part.prepare(**part.settings, constants=part.inputs["constants"], sections={})
     results = [work.function(item) for item in work.items]
     writers = work.finish(results)
     writers[".parquet"]("targets.parquet")
@@ -302,14 +298,14 @@ def test_targets_are_sought_on_where_the_first_do_not_do(project, monkeypatch):
 
 def test_too_many_failures_are_an_error_that_names_the_first(project, monkeypatch):
     heavy = {
-        "payload": small().samples.grid.payload.model_copy(
-            update={"maximum": 1e8, "increment": 1e8 - 50.0}
-        )
+        "payload": small()
+        .samples.grid["payload"]
+        .model_copy(update={"maximum": 1e8, "increment": 1e8 - 50.0})
     }
     section = small()
-    grid = section.samples.grid.model_copy(update=heavy)
+    grid = section.samples.grid | heavy
     samples = section.samples.model_copy(update={"grid": grid, "maximum_failed_share": 0.1})
     parts = module.parts(section.model_copy(update={"samples": samples}))[:1]
-    with pytest.raises(FlexikError, match=r"grid: .* of 36 samples failed.*0\.1; first: strokes"):
+    with pytest.raises(FlexikError, match=r"grid: .* of 36 samples failed.*0\.1; first: lift"):
         make("grid", parts, ParallelSettings(n_workers=1))
     assert not (project / "grid/grid.parquet").exists()

@@ -8,7 +8,6 @@ import pytest
 from planar_machines import FILES
 from pydantic import ValidationError
 
-from flexik.cases.crane.parts.samples import random_samples
 from flexik.errors import ParameterError, SolverError
 from flexik.kinematics.crane import forward, pose, rotate
 from flexik.kinematics.machine_file import crane_geometry
@@ -27,6 +26,7 @@ from flexik.multibody.flexible import FlexibleMachine
 from flexik.multibody.joint_forces import joint_forces, pins_of
 from flexik.multibody.model import PlanarModel
 from flexik.multibody.planar import tips
+from flexik.planar.samples import random_samples
 
 PINS = pins_of(crane_case.crane().machine)
 NONE = dict.fromkeys(PINS, 0.0)
@@ -42,8 +42,8 @@ def crane():
 
 
 @pytest.fixture(scope="module")
-def samples(geometry):
-    return random_samples(geometry, 12, (0.0, 400.0), 0.5, seed=5)
+def samples():
+    return random_samples(crane_case.MACHINE, 12, (0.0, 400.0), 0.5, seed=5)
 
 
 def with_play(crane, **play):
@@ -57,7 +57,7 @@ def forces(crane, strokes, payload, play=NONE):
 
 
 def test_a_twin_of_no_errors_is_the_nominal_crane(crane, samples):
-    strokes = np.vstack([samples.strokes, np.repeat(samples.strokes[:1], 3, axis=0)])
+    strokes = np.vstack([samples.values, np.repeat(samples.values[:1], 3, axis=0)])
     payload = np.append(samples.payload, [0.0, 86.0, 172.0])
     twin = draw_twin(crane, ZERO, seed=3)
     found = as_built_tips(twin, strokes, payload, np.random.default_rng(1))
@@ -123,13 +123,13 @@ def without_gravity(crane):
 def test_unloaded_the_tip_is_that_of_the_rigid_crane_with_the_same_errors(crane, samples):
     twin = draw_twin(crane, USUAL.model_copy(update={"play": 0.0}), seed=2).machine
     geometry = crane_geometry(twin.machine)
-    found = tips(without_gravity(twin), samples.strokes, samples.payload)
+    found = tips(without_gravity(twin), samples.values, samples.payload)
     # the tip may lie off the line of sliding too
     left, along = twin.machine.located("extension.tip").point[1], geometry.extension_start[1]
     front = twin.machine.located("jib.front_pad").point[1]
     moved = replace(geometry, extension_start=(geometry.extension_start[0], front + left))
     assert along != front
-    assert found == pytest.approx(forward(moved, samples.strokes), abs=1e-8)
+    assert found == pytest.approx(forward(moved, samples.values), abs=1e-8)
 
 
 @pytest.mark.parametrize("name", ["excavator", "concrete_pump"])
@@ -148,8 +148,8 @@ def test_any_machine_has_a_twin(name):
 def test_stroke_offsets_are_shifted_strokes(crane, samples):
     offset = np.array([1e-3, -2e-3, 5e-4])
     twin = AsBuilt(crane, NONE, offset, 3e-4)
-    found = as_built_tips(twin, samples.strokes, samples.payload)
-    expected = tips(crane, samples.strokes + offset, samples.payload)
+    found = as_built_tips(twin, samples.values, samples.payload)
+    expected = tips(crane, samples.values + offset, samples.payload)
     assert found == pytest.approx(expected, abs=1e-7)
 
 
@@ -181,8 +181,8 @@ def test_play_of_a_cylinder_is_a_stroke_that_follows_its_force(crane, drive):
 def test_forces_are_nearly_those_of_the_rigid_crane(crane, samples, element):
     crane = replace(crane, machine=crane.machine.with_constants({"element": element}))
     loads = -9.81 * samples.payload[:, None] * [0.0, 1.0]
-    expected = joint_forces(crane.machine, crane.linkage.poses(samples.strokes), loads)
-    for k, (strokes, payload) in enumerate(zip(samples.strokes, samples.payload, strict=True)):
+    expected = joint_forces(crane.machine, crane.linkage.poses(samples.values), loads)
+    for k, (strokes, payload) in enumerate(zip(samples.values, samples.payload, strict=True)):
         found = forces(crane, strokes, payload)
         largest = max(np.abs(force).max() for force in found.values())
         for key, force in found.items():
@@ -226,7 +226,7 @@ def test_play_moves_the_tip_as_rigid_kinematics_say(crane, samples, element, pin
     crane = replace(crane, machine=crane.machine.with_constants({"element": element}))
     play = NONE | dict.fromkeys(pins, 4e-4)
     rows = slice(0, 5)
-    strokes, payload = samples.strokes[rows], samples.payload[rows]
+    strokes, payload = samples.values[rows], samples.payload[rows]
     found = settled_tips(with_play(crane, **play), strokes, payload) - tips(crane, strokes, payload)
     for row, mass, moved in zip(strokes, payload, found, strict=True):
         expected = rigid_with_play(crane.geometry, row, play, forces(crane, row, mass))
@@ -285,7 +285,7 @@ def test_every_pin_ends_on_the_side_of_its_force(crane, monkeypatch):
 
 def test_statics_tell_the_seats_but_for_micrometres(crane, samples, monkeypatch):
     twin = draw_twin(crane, USUAL.model_copy(update={"play": 6e-5}), seed=9)
-    strokes, payload = samples.strokes, samples.payload / 4
+    strokes, payload = samples.values, samples.payload / 4
     solve, solved = PlanarModel.solve, []
     monkeypatch.setattr(PlanarModel, "solve", lambda *given: (solved.append(1), solve(*given)))
     found = settled_tips(twin, strokes, payload)
@@ -318,7 +318,7 @@ def test_pins_that_do_not_settle_are_an_error(crane, monkeypatch):
 
 def test_rows_do_not_depend_on_each_other(crane, samples):
     twin = draw_twin(crane, USUAL, seed=9)
-    strokes, payload = samples.strokes, samples.payload
+    strokes, payload = samples.values, samples.payload
     together = as_built_tips(twin, strokes, payload)
     back = as_built_tips(twin, strokes[::-1], payload[::-1])
     assert together == pytest.approx(back[::-1], abs=1e-7)

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import virtual_work
 
-from flexik.cases.crane.parts.samples import random_samples
 from flexik.errors import SolverError
 from flexik.kinematics.crane import forward
 from flexik.multibody.joint_forces import pins_of
 from flexik.multibody.model import PlanarModel
 from flexik.multibody.planar import shapes, solve, tips
+from flexik.planar.samples import random_samples
 
 SPRING = 8e6  # N m/rad
 
@@ -23,8 +23,8 @@ def crane():
 
 
 @pytest.fixture(scope="module")
-def samples(geometry):
-    return random_samples(geometry, 50, (30.0, 500.0), 0.0, seed=20)
+def samples():
+    return random_samples(crane_case.MACHINE, 50, (30.0, 500.0), 0.0, seed=20)
 
 
 def with_constants(crane, **changes):
@@ -33,7 +33,7 @@ def with_constants(crane, **changes):
 
 def calculated(samples, solve):
     structure = virtual_work.nominal_structure(SPRING)
-    rows = zip(samples.strokes, samples.payload, strict=True)
+    rows = zip(samples.values, samples.payload, strict=True)
     return [solve(structure, *row) for row in rows]
 
 
@@ -43,7 +43,7 @@ def nonlinear(samples):
 
 
 def test_tip_deflection_is_that_of_virtual_work_and_of_statics(crane, samples, nonlinear):
-    found = tips(crane, samples.strokes, samples.payload) - forward(crane.geometry, samples.strokes)
+    found = tips(crane, samples.values, samples.payload) - forward(crane.geometry, samples.values)
     # first-order theory about the undeformed crane, and statics on the deformed one
     linear = calculated(samples, virtual_work.solve)
     for results, largest in ((linear, 0.02), (nonlinear, 0.01)):
@@ -59,7 +59,7 @@ def pin_forces(crane, strokes, payload):
 
 
 def test_forces_are_those_of_statics(crane, samples, nonlinear):
-    for strokes, payload, expected in zip(samples.strokes, samples.payload, nonlinear, strict=True):
+    for strokes, payload, expected in zip(samples.values, samples.payload, nonlinear, strict=True):
         found = pin_forces(crane, strokes, payload)
         largest = max(abs(force) for force in expected.forces.values())
         for name in ("lift", "jib"):
@@ -78,16 +78,16 @@ def test_full_reach_at_full_payload_needs_the_published_cylinder_force(crane):
 
 
 def test_both_elements_agree(crane, samples):
-    rigid = forward(crane.geometry, samples.strokes)
-    exact = tips(crane, samples.strokes, samples.payload)
-    ancf = tips(with_constants(crane, element="ancf"), samples.strokes, samples.payload)
+    rigid = forward(crane.geometry, samples.values)
+    exact = tips(crane, samples.values, samples.payload)
+    ancf = tips(with_constants(crane, element="ancf"), samples.values, samples.payload)
     difference = np.linalg.norm(exact - ancf, axis=1)
     assert (difference / np.linalg.norm(exact - rigid, axis=1)).max() < 5e-3
 
 
 def test_default_mesh_is_within_a_percent_of_one_four_times_finer(crane, samples):
     rows = slice(0, 12)
-    strokes, payload = samples.strokes[rows], samples.payload[rows]
+    strokes, payload = samples.values[rows], samples.payload[rows]
     coarse = tips(crane, strokes, payload)
     fine = tips(replace(crane, refinement=4), strokes, payload)
     deflection = np.linalg.norm(fine - forward(crane.geometry, strokes), axis=1)

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from smoke_pipeline import PARAMETERS, ROOT
 
-from flexik.cases.case import STAGES, codes
+from flexik.cases.case import STAGES
 from flexik.datasets.tables import read_table
 
 # one process, which makes the project once
 pytestmark = pytest.mark.xdist_group("pipeline")
 
-each_case = pytest.mark.parametrize("case", codes())
+each_case = pytest.mark.parametrize("case", list(PARAMETERS["cases"]))
 
 
 def metrics(project, case):

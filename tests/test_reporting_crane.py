@@ -108,7 +108,7 @@ def results():
             {"trainer": ["a"] * 3, "seconds": [0.0, 0.5, 30.0], "error": [1.0, 0.5, 0.1]}
         ),
         shape={
-            "strokes": [0.13, 0.1, 1.2],
+            "values": [0.13, 0.1, 1.2],
             "payload": 470.0,
             "exaggeration": 5.0,
             "beams": beams,

@@ -51,7 +51,7 @@ def module_file(name: str) -> Path | None:
 
 
 def _uncounted(name: str) -> bool:
-    if name.startswith("flexik.cases.") and name.endswith("section"):
+    if name.startswith(("flexik.cases.", "flexik.planar.")) and name.endswith("section"):
         return True
     return any(name == known or name.startswith(f"{known}.") for known in UNCOUNTED[1:]) or (
         name == UNCOUNTED[0]

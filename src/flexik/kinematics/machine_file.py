@@ -24,20 +24,28 @@ def read_manipulator(path: Path | str) -> tuple[PlanarMachine, Manipulator]:
     """
     machine = read_machine(path)
     try:
+        check_kinematics(machine)
         return machine, manipulator_of(machine)
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
 
 
 def manipulator_of(machine: PlanarMachine) -> Manipulator:
-    """Kinematics of `machine`.
+    """Kinematics of `machine`; raises ParameterError, which names the key, if they are not."""
+    if machine.kinematics == "general":
+        return PlanarManipulator(machine)
+    return _CLOSED_FORMS[machine.kinematics](machine)
 
-    Raises ParameterError, which names the key, where its bodies are free or held twice, its loops
-    do not close over the strokes, or its closed form is another machine's.
+
+def check_kinematics(machine: PlanarMachine) -> None:
+    """Raise ParameterError, which names the key, if `machine` is no mechanism.
+
+    Its bodies are free or held twice, its loops do not close over the strokes, or its closed form
+    is another machine's.
     """
     general = PlanarManipulator(machine)
     if machine.kinematics == "general":
-        return general
+        return
     closed = _CLOSED_FORMS[machine.kinematics](machine)
     limits = (closed.lower, general.lower), (closed.upper, general.upper)
     if not all(np.array_equal(*pair) for pair in limits):
@@ -50,7 +58,6 @@ def manipulator_of(machine: PlanarMachine) -> Manipulator:
             f"kinematics: expected general, the closed form {machine.kinematics} is another "
             f"machine's: its tips lie up to {off:.3g} m off"
         )
-    return closed
 
 
 def check_machine(machine: PlanarMachine) -> None:
@@ -58,7 +65,7 @@ def check_machine(machine: PlanarMachine) -> None:
     wrong = faults(machine)
     try:
         if not wrong:
-            manipulator_of(machine)
+            check_kinematics(machine)
     except ParameterError as error:
         wrong = [str(error)]
     if wrong:

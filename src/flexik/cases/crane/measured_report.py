@@ -89,7 +89,7 @@ def values(results: Measured) -> dict[str, Any]:
         "settings": results.section.studies.measured,
         "n_named": len(named_points(results.targets)),
         "n_failed": int((results.commands["status"] != REACHED).sum()),
-        "least_trained_payload": results.section.samples.grid.payload.minimum,
+        "least_trained_payload": results.section.samples.grid["payload"].minimum,
         "published_payloads": sorted(results.campaign["payload"].unique()) == PUBLISHED_PAYLOADS,
         "titles": BUDGET_TITLES,
         "sensitivity": _sensitivity(results),

@@ -81,7 +81,7 @@ def read(section: Section) -> Measured:
     files |= {"restarts": "budget.restarts", "offsets": "identified"}
     files |= {name: f"identified.{name}" for name in ("predictions", "commands")}
     folder = section.data / "studies/measured"
-    crane = flexible(section.machine, section.data / "constants/spring.json")
+    crane = flexible(section.machine, section.data / "constants/constants.json")
     return Measured(
         section,
         crane,

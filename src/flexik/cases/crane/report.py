@@ -8,13 +8,13 @@ import pandas as pd
 
 from flexik.cases.crane.measured_report import measured
 from flexik.cases.crane.parts.fields import STROKES
-from flexik.cases.crane.parts.samples import counts
 from flexik.cases.crane.report_figures import figures
 from flexik.cases.crane.report_results import REFERENCE, Results, read
 from flexik.cases.crane.report_tables import calibration, tables
 from flexik.cases.crane.section import Section
 from flexik.evaluation.errors import STATISTICS
 from flexik.kinematics.status import REACHED, STATUS_MEANING
+from flexik.planar.samples import counts
 from flexik.reporting.report import Content, write_case
 from flexik.reporting.style import MM
 

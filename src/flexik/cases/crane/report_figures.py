@@ -5,11 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from flexik.cases.crane.parts.fields import STROKES, deflection, on_line
+from flexik.cases.crane.parts.fields import STROKES, on_line
 from flexik.cases.crane.report_mechanism import LINK_LOOKS, crane, links
 from flexik.cases.crane.report_results import Results
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.status import REACHED
+from flexik.planar.fields import deflection
 from flexik.reporting import kinds, plane, style
 from flexik.reporting.chart import Axis, Layer, chart
 from flexik.reporting.report import Drawing, draw

@@ -90,15 +90,16 @@ def links(geometry: CraneGeometry, strokes: Array) -> pd.DataFrame:
 def crane(geometry: CraneGeometry, shape: Mapping[str, Any]) -> Drawing:
     """The loaded crane, deflection enlarged, over its rigid pose.
 
-    shape : strokes (3,) in m; payload in kg; exaggeration of the deflection; beams and reference:
-        for each of BEAMS the nodes (k, 2) in m, in equilibrium and rigid; tip, rigid_tip (2,) in m.
+    shape : values, strokes (3,) in m; payload in kg; exaggeration of the deflection; beams and
+        reference: for each of BEAMS the nodes (k, 2) in m, in equilibrium and rigid; tip and
+        rigid_tip (2,) in m.
     """
     rigid = {name: np.asarray(shape["reference"][name], dtype=float) for name in BEAMS}
     bent = {
         name: nodes + float(shape["exaggeration"]) * (np.asarray(shape["beams"][name]) - nodes)
         for name, nodes in rigid.items()
     }
-    strokes = np.asarray(shape["strokes"], dtype=float)
+    strokes = np.asarray(shape["values"], dtype=float)
     posed = pose(geometry, strokes[None])
     rigid_pins = {letter: getattr(posed, field)[0] for letter, (field, _, _) in PINS.items()}
     pins, angle = _carry_pins(rigid_pins, rigid, bent), float(posed.lift_angle[0])

@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from flexik.cases.crane.parts.fields import kept
-from flexik.cases.crane.parts.learning import correction
-from flexik.cases.crane.section import Section
+from flexik.cases.crane.section import SPRING, Section
 from flexik.datasets.tables import read_csv, read_table
 from flexik.evaluation.errors import STATISTICS, statistics, workspace_statistics
 from flexik.evaluation.operations import (
@@ -24,6 +22,8 @@ from flexik.files import read_json
 from flexik.learning.perceptron import Network
 from flexik.learning.size_selection import by_size, read_layers
 from flexik.learning.storage import load_network
+from flexik.planar.fields import kept
+from flexik.planar.learning import correction
 from flexik.positioning.inverted_network import InvertedSettings
 from flexik.positioning.method import Settings
 from flexik.reporting.report import digest
@@ -96,7 +96,7 @@ class Results:
     def corrections(self) -> dict[str, np.ndarray]:
         """What networks of published size that correct another learn from (n, 2), m."""
         return {
-            name: correction(self.kept, self.trained[network.corrects])
+            name: correction(self.kept, self.section.machine, self.trained[network.corrects])
             for name, network in self.section.networks.items()
             if network.corrects and not network.is_selected
         }
@@ -184,7 +184,7 @@ def read(section: Section) -> Results:
     )
     return Results(
         section=section,
-        spring_stiffness=read_json(data / "constants/spring.json")["spring_stiffness"],
+        spring_stiffness=read_json(data / "constants/constants.json")["constants"][SPRING],
         grid=read_table(data / "samples/grid.parquet"),
         selection=read_table(data / "samples/selection.parquet"),
         errors=errors,
@@ -208,7 +208,8 @@ def read(section: Section) -> Results:
         training_curves=read_csv(
             BENCHMARKS / "training_methods.csv", ("seconds", "error"), ("trainer",)
         ),
-        shape=read_json(data / "studies/shape.json"),
+        shape=read_json(data / "studies/shape.json")
+        | {"exaggeration": section.studies.shape.exaggeration},
     )
 
 

@@ -4,9 +4,9 @@ from typing import Any
 
 import pandas as pd
 
-from flexik.cases.crane.parts.learning import learnt_rows
 from flexik.cases.crane.report_results import KIND, Results
 from flexik.learning.size_rules import haykin, haykin_samples, oja
+from flexik.planar.learning import learnt_rows
 from flexik.positioning.inverted_network import InvertedSettings
 from flexik.reporting import style
 from flexik.reporting.style import MM
@@ -210,10 +210,10 @@ def _race(curves: pd.DataFrame) -> Table:
 
 def _size_rules(results: Results) -> pd.DataFrame:
     """What rules of thumb would have chosen."""
-    rows, geometry = [], results.section.geometry
+    rows, machine = [], results.section.machine
     for name, (_, chosen) in results.studies.items():
         learns, network = results.section.networks[name].learns, results.trained[name]
-        n_samples = len(learnt_rows(results.kept, learns or "correction", geometry))
+        n_samples = len(learnt_rows(results.kept, learns or "correction", machine))
         n_inputs, n_outputs = len(network.inputs), len(network.outputs)
         asked = haykin_samples(n_inputs, chosen, n_outputs, ERROR_FRACTION)
         rows.append(

@@ -2,30 +2,23 @@
 
 import math
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Self
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from flexik.cases.crane.measured_section import Measured
 from flexik.cases.crane.parts.measured.campaign_file import own_campaign
-from flexik.errors import ParameterError
-from flexik.kinematics.crane import CraneGeometry, smallest_extension
-from flexik.kinematics.machine_file import check_machine, crane_geometry
-from flexik.machines.planar import PlanarMachine
-from flexik.parameters.conditions import ConditionSet, Points, RandomTargets, check_different
-from flexik.parameters.model import Count, Model, Name, NotNegative, Positive, Seed, Share
-from flexik.parameters.networks import Axis, Network, check_networks
-from flexik.parameters.section import CaseSection
+from flexik.kinematics.crane import CraneGeometry
+from flexik.kinematics.machine_file import crane_geometry
+from flexik.parameters.conditions import Points, RandomTargets, check_different
+from flexik.parameters.model import Count, Model, Name, NotNegative, Positive, Seed
+from flexik.planar import section as planar
+from flexik.planar.section import SAME, PlanarSection
 from flexik.positioning.combined import Settings as Combined
 from flexik.positioning.inverted_network import InvertedSettings
-from flexik.positioning.registry import Methods, check_methods
 
-STROKES = ("lift", "jib", "extension")
 # The one free constant of the machine file
 SPRING = "joints.slew.springs.torsion"
-# Strokes closer than this are the same, m
-LENGTH_TOLERANCE = 1e-9
 
 # The published test conditions [chapter 4], as far as they are known: see `conditions` there
 PUBLISHED = Points(
@@ -54,38 +47,6 @@ class Calibration(Model):
         if self.stiffness_range[0] >= self.stiffness_range[1]:
             raise ValueError("stiffness_range: must increase")
         return self
-
-
-class Grid(Model):
-    """Training grid, table 4.1; m and kg."""
-
-    lift: Axis
-    jib: Axis
-    extension: Axis
-    payload: Axis
-
-
-class Selection(Model):
-    """Random set that chooses among restarts."""
-
-    n_samples: Count
-    payload: tuple[NotNegative, NotNegative]
-    seed: Seed
-
-
-class Samples(Model):
-    """Poses to learn from and to select by; left out are those with the tip behind a limit."""
-
-    grid: Grid
-    selection: Selection
-    minimum_tip_x: float = 0.0
-    maximum_failed_share: Share = 0.01
-
-
-class CraneNetwork(Network):
-    """A network of the crane."""
-
-    learns: Literal["deflection", "tip", "rigid_tip", "coordinates"] | None = None
 
 
 class MeshStudy(Model):
@@ -145,15 +106,10 @@ class Studies(Model):
     measured: Measured
 
 
-class Section(CaseSection):
+class Section(PlanarSection):
     """The log crane."""
 
-    machine: PlanarMachine
     calibration: Calibration = Calibration()  # type: ignore[assignment]
-    samples: Samples
-    networks: Annotated[dict[Name, CraneNetwork], Field(min_length=1)]
-    conditions: dict[Name, ConditionSet]
-    methods: Methods
     studies: Studies
 
     @property
@@ -165,8 +121,7 @@ class Section(CaseSection):
     def files(self) -> list[Path]:
         """Section tables, and a campaign of the user's own."""
         own = self.studies.measured.campaign.file
-        tables = self.machine.section_files.values()
-        return [Path(file) for file in (*tables, *([] if own is None else [own]))]
+        return super().files + ([] if own is None else [Path(own)])
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -177,54 +132,37 @@ class Section(CaseSection):
                 f"machine.{SPRING}: expected fit, and a value for everything else; a known value "
                 "stands under calibration.stiffness"
             )
-        self._check_strokes()
+        self._check_shape()
         self._check_fitting()
-        check_networks(self.networks, self.trainers)
-        for name, network in self.networks.items():
-            if network.corrects and self.networks[network.corrects].learns != "rigid_tip":
-                raise ValueError(f"networks.{name}.corrects: expected a network of the rigid_tip")
-            if len(network.layers) != 1:
-                raise ValueError(f"networks.{name}.n_hidden: expected one layer")
-        check_methods(self.methods, self.networks)
         self._check_methods()
         for name, kind in (("published", Points), ("workspace", RandomTargets)):
             if not isinstance(self.conditions.get(name), kind):
                 raise ValueError(f"conditions.{name}: expected {kind.__name__}, which is reported")
-        if taken := self.conditions.keys() & type(self.samples).model_fields.keys():
-            raise ValueError(f"conditions.{min(taken)}: the name is taken")
         return self
 
-    def _check_strokes(self) -> None:
-        reach = dict(zip(STROKES, self.geometry.stroke_maximum, strict=True))
-        for name, longest in reach.items():
-            axis = getattr(self.samples.grid, name)
-            if axis.minimum < 0.0 or axis.maximum > longest + LENGTH_TOLERANCE:
+    def _check_shape(self) -> None:
+        for stroke, (name, drive) in zip(
+            self.studies.shape.strokes, self.machine.drives.items(), strict=True
+        ):
+            if stroke > drive.limits[1] + SAME:
                 raise ValueError(
-                    f"samples.grid.{name}: lies beyond the cylinder, {longest} m at most"
-                )
-        shown = self.studies.shape.strokes
-        for stroke, (name, longest) in zip(shown, reach.items(), strict=True):
-            if stroke > longest:
-                raise ValueError(
-                    f"studies.shape.strokes: {name} beyond the cylinder, {longest} m at most"
+                    f"studies.shape.strokes: {name} beyond the cylinder, {drive.limits[1]} m"
                 )
 
     def _check_fitting(self) -> None:
         fitting, grid = self.studies.fitting, self.samples.grid
         for name in ("jib", "extension", "payload"):
-            axis, value = getattr(grid, name), getattr(fitting, name)
+            axis, value = grid[name], getattr(fitting, name)
             steps = (value - axis.minimum) / axis.increment
             if not axis.minimum <= value <= axis.maximum or abs(steps - round(steps)) > 1e-6:
                 raise ValueError(f"studies.fitting.{name}: {value} is no value of the grid")
-        n_vectors = math.prod(getattr(grid, name).n_values for name in type(grid).model_fields)
+        n_vectors = math.prod(axis.n_values for axis in grid.values())
         if fitting.n_samples > n_vectors:
             raise ValueError(f"studies.fitting.n_samples: the grid has {n_vectors} vectors")
         if fitting.trainer not in self.trainers:
             raise ValueError(f"studies.fitting.trainer: there is no trainer {fitting.trainer!r}")
 
     def _check_methods(self) -> None:
-        if "none" not in self.methods:
-            raise ValueError("methods.none: expected, the others are compared with it")
         needed = {
             f"tolerance.methods.{number}": (name, InvertedSettings)
             for number, name in enumerate(self.studies.tolerance.methods)
@@ -242,42 +180,16 @@ class Section(CaseSection):
 
 
 def check(section: Section) -> None:
-    """The machine is one, targets are reached.
+    """The machine is one, targets are reached, a campaign of the user's own can be read.
 
     Raises ParameterError naming the key.
     """
-    geometry = section.geometry
-    try:
-        check_machine(section.machine)
-    except ValueError as error:
-        raise ParameterError(f"{section.machine_file}: {error}") from None
     measured = section.studies.measured
-    sets = {f"conditions.{name}": given for name, given in section.conditions.items()} | {
+    others = {
         "calibration.conditions": section.calibration.conditions,
         "studies.measured.campaign": measured.campaign,
         "studies.measured.adaptation": measured.adaptation,
     }
-    for key, given in sets.items():
-        if isinstance(given, Points):
-            points = np.array(given.points)
-            missed = np.flatnonzero(np.isnan(smallest_extension(geometry, points)))
-            if missed.size:
-                x, y = points[missed[0]]
-                others = f", nor {missed.size - 1} others" if missed.size > 1 else ""
-                raise ParameterError(
-                    f"params.yaml: {section.name}.{key}.points.{missed[0]}: the rigid crane does "
-                    f"not reach ({x:g}, {y:g}) m{others}"
-                )
-            continue
-        x, y = (axis.ravel() for axis in np.meshgrid(*(np.linspace(*a, 60) for a in _area(given))))
-        raster = np.column_stack([x, y])[x >= section.samples.minimum_tip_x]
-        if np.isnan(smallest_extension(geometry, raster)).all():
-            raise ParameterError(
-                f"params.yaml: {section.name}.{key}: the crane reaches nothing in x, y"
-            )
+    planar.check(section, others)
     if measured.campaign.file is not None:
-        own_campaign(measured.campaign.file, geometry)
-
-
-def _area(given: Any) -> tuple[tuple[float, float], tuple[float, float]]:
-    return given.x, given.y
+        own_campaign(measured.campaign.file, section.geometry)

@@ -1,6 +1,6 @@
 """The ground spring, so that the uncompensated mean error is the published one, or as it is known.
 
-`spring.json` holds the stiffness, and the statistics of the errors that it leaves.
+`constants.json` holds the stiffness, and the statistics of the errors that it leaves.
 """
 
 import functools
@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from flexik.cases.crane.parts.conditions import at_points
-from flexik.cases.crane.parts.crane import columns_of, on_spring
-from flexik.cases.crane.section import Calibration, Section
+from flexik.cases.crane.parts.crane import on_spring
+from flexik.cases.crane.section import SPRING, Calibration, Section
 from flexik.datasets.parts import Part, Work, Writer, json_file, whole
 from flexik.datasets.tables import read_csv
 from flexik.errors import DataError
@@ -20,16 +19,18 @@ from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.machine_file import crane_geometry
 from flexik.machines.planar import PlanarMachine
 from flexik.multibody.planar import tips
+from flexik.planar.conditions import at_points
+from flexik.planar.machine import columns_of
 from flexik.positioning.none import Uncompensated
 
 PUBLISHED = Path("data/reference/crane/positioning_errors.csv")
 
 
 def parts(section: Section) -> list[Part]:
-    """`spring`."""
+    """`constants`."""
     settings = {"machine": section.machine, "calibration": section.calibration}
     sections = section.machine.section_files
-    return [Part("spring", prepare, settings, {"published": PUBLISHED, "sections": sections})]
+    return [Part("constants", prepare, settings, {"published": PUBLISHED, "sections": sections})]
 
 
 def prepare(
@@ -42,7 +43,7 @@ def prepare(
 def _spring(machine: PlanarMachine, calibration: Calibration, published: Path) -> dict[str, Writer]:
     if calibration.stiffness is not None:
         print(f"ground spring {calibration.stiffness:.6g} N m/rad, as given")
-        return {".json": json_file({"spring_stiffness": calibration.stiffness})}
+        return {".json": json_file({"constants": {SPRING: calibration.stiffness}})}
     table = read_csv(published, ("none",), ("statistic",)).set_index("statistic")["none"]
     if "mean_error" not in table:
         raise DataError(f"{published}: expected a row mean_error")
@@ -57,5 +58,5 @@ def _spring(machine: PlanarMachine, calibration: Calibration, published: Path) -
     mean_error = 1e-3 * float(table["mean_error"])
     fit = fit_spring(uncompensated, mean_error, calibration.stiffness_range)
     print(f"ground spring {fit.spring_stiffness:.6g} N m/rad")
-    left = {"spring_stiffness": fit.spring_stiffness, "uncompensated": statistics(fit.errors)}
+    left = {"constants": {SPRING: fit.spring_stiffness}, "uncompensated": statistics(fit.errors)}
     return {".json": json_file(left)}

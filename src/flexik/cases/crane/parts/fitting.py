@@ -13,9 +13,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from flexik.cases.crane.parts.crane import flexible, model_inputs
-from flexik.cases.crane.parts.fields import INPUTS, SAMPLE_FIELDS, deflection, kept, on_line
-from flexik.cases.crane.parts.learning import KINDS
+from flexik.cases.crane.parts.crane import flexible
+from flexik.cases.crane.parts.fields import on_line
 from flexik.cases.crane.section import Fitting, Section
 from flexik.datasets.parts import Part, Work, Writer, stacked, table
 from flexik.datasets.tables import Field, read_table
@@ -25,6 +24,9 @@ from flexik.learning.perceptron import Network, quantities
 from flexik.learning.training import Architecture, Lesson, train
 from flexik.machines.planar import PlanarMachine
 from flexik.multibody.planar import tips
+from flexik.planar.fields import deflection, inputs, kept, sample_fields
+from flexik.planar.learning import kind_of
+from flexik.planar.machine import model_inputs
 
 FIELDS = (
     Field("n_hidden", "1", "neurons in the hidden layer", "int64"),
@@ -52,12 +54,12 @@ def prepare(
     machine: PlanarMachine,
     study: Fitting,
     trainer: Any,
-    spring: Path,
+    constants: Path,
     sections: dict[str, Path],
     grid: Path,
 ) -> Work:
     """Train a network of each size."""
-    samples = kept(read_table(grid, SAMPLE_FIELDS))
+    samples = kept(read_table(grid, sample_fields(machine)))
     left_out = on_line(samples, study.jib, study.extension, study.payload)
     if left_out.sum() < 2:
         raise ParameterError(
@@ -69,13 +71,13 @@ def prepare(
             f"crane.studies.fitting.n_samples: the grid has {len(others)} to choose from"
         )
     rows = np.random.default_rng(study.seed).choice(len(others), study.n_samples, False)
-    crane = flexible(machine, spring)
+    crane = flexible(machine, constants)
     lift = np.linspace(line["lift_stroke"].min(), line["lift_stroke"].max(), N_POINTS)
     strokes = np.column_stack([lift, np.full((N_POINTS, 2), [study.jib, study.extension])])
     payload = np.full(N_POINTS, study.payload)
     truth = (tips(crane, strokes, payload) - forward(crane.geometry, strokes))[:, 1]
-    queries = np.column_stack([strokes, payload]), line[list(INPUTS)].to_numpy()
-    learn = functools.partial(_curve, others.iloc[rows], trainer, study.seed, queries)
+    queries = np.column_stack([strokes, payload]), line[inputs(machine)].to_numpy()
+    learn = functools.partial(_curve, machine, others.iloc[rows], trainer, study.seed, queries)
 
     def finish(results: list[Mapping[str, NDArray]]) -> Mapping[str, Writer]:
         found = []
@@ -90,6 +92,7 @@ def prepare(
 
 
 def _curve(
+    machine: PlanarMachine,
     samples: pd.DataFrame,
     trainer: Any,
     seed: int,
@@ -97,20 +100,23 @@ def _curve(
     n_hidden: int,
 ) -> dict[str, NDArray]:
     """Vertical deflection at the points of the curve, and at the poses left out."""
-    network = _trained(samples, trainer, seed, n_hidden)
+    network = _trained(machine, samples, trainer, seed, n_hidden)
     curve, line = (network.predict(query)[:, 1] for query in queries)
     return {"curve": curve, "line": line}
 
 
-def _trained(samples: pd.DataFrame, trainer: Any, seed: int, n_hidden: int) -> Network:
+def _trained(
+    machine: PlanarMachine, samples: pd.DataFrame, trainer: Any, seed: int, n_hidden: int
+) -> Network:
     """Deflection network of `n_hidden` neurons that learnt from `samples`."""
+    kind = kind_of(machine, "deflection")
     try:
         network, _ = train(
             Lesson(
-                samples[list(INPUTS)].to_numpy(),
+                samples[inputs(machine)].to_numpy(),
                 deflection(samples),
-                quantities(KINDS["deflection"].inputs),
-                quantities(KINDS["deflection"].outputs),
+                quantities(kind.inputs),
+                quantities(kind.outputs),
                 Architecture(n_hidden),
                 trainer,
                 seed,

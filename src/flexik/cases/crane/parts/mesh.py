@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flexik.cases.crane.parts.crane import FlexibleCrane, flexible, model_inputs
-from flexik.cases.crane.parts.samples import Samples, random_samples
+from flexik.cases.crane.parts.crane import FlexibleCrane, flexible
 from flexik.cases.crane.section import MeshStudy, Section
 from flexik.datasets.parts import Part, Work, Writer, table
 from flexik.datasets.tables import Field
@@ -17,6 +16,8 @@ from flexik.kinematics.crane import forward
 from flexik.machines.planar import PlanarMachine
 from flexik.multibody.elements import ELEMENTS
 from flexik.multibody.planar import tips
+from flexik.planar.machine import model_inputs
+from flexik.planar.samples import Samples, random_samples
 
 FIELDS = (
     Field("n_samples", "1", "random strokes and payloads", "int64"),
@@ -46,15 +47,15 @@ def prepare(
     study: MeshStudy,
     payload: tuple[float, float],
     minimum_tip_x: float,
-    spring: Path,
+    constants: Path,
     sections: dict[str, Path],
 ) -> Work:
     """Tips of every variant; the last refinement of the machine's own element is the reference."""
-    crane = flexible(machine, spring)
-    samples = random_samples(crane.geometry, study.n_samples, payload, minimum_tip_x, study.seed)
+    crane = flexible(machine, constants)
+    samples = random_samples(machine, study.n_samples, payload, minimum_tip_x, study.seed)
     variants: list[tuple[str, int]] = [(machine.element, study.refinements[-1])]
     variants += [(element, n) for element in ELEMENTS for n in study.refinements]
-    rigid = forward(crane.geometry, samples.strokes)
+    rigid = forward(crane.geometry, samples.values)
 
     def finish(results: list[Mapping[str, NDArray]]) -> Mapping[str, Writer]:
         reference, *others = (result["tip"] for result in results)
@@ -77,7 +78,7 @@ def _tips(
 ) -> dict[str, NDArray[np.float64]]:
     machine = crane.machine.with_constants({"element": variant[0]})
     other = replace(crane, machine=machine, refinement=variant[1])
-    return {"tip": tips(other, samples.strokes, samples.payload)}
+    return {"tip": tips(other, samples.values, samples.payload)}
 
 
 def _mean(values: NDArray[np.float64]) -> float:

@@ -1,12 +1,15 @@
 """What varies one thing: mesh, shape, size of a network, tolerance, and the crane as built."""
 
-from flexik.cases.crane.parts import fitting, mesh, shape, tolerance
+from flexik.cases.crane.parts import fitting, mesh, tolerance
 from flexik.cases.crane.parts.measured.parts import measured_parts
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part
+from flexik.planar import shape
 
 
 def parts(section: Section) -> list[Part]:
     """The studies of the nominal crane, then those of the measured one."""
-    nominal = [study.part(section) for study in (mesh, shape, fitting, tolerance)]
-    return nominal + measured_parts(section)
+    shown = section.studies.shape
+    drawn = shape.part(section, shown.strokes, shown.payload)
+    nominal = [study.part(section) for study in (mesh, fitting, tolerance)]
+    return [drawn, *nominal, *measured_parts(section)]

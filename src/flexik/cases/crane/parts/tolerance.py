@@ -7,9 +7,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from flexik.cases.crane.parts.conditions import at_points
-from flexik.cases.crane.parts.crane import columns_of, flexible, model_inputs
-from flexik.cases.crane.parts.methods import method_inputs, method_settings, trained_method
+from flexik.cases.crane.parts.crane import flexible
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part, Work, rows
 from flexik.evaluation.conditions import Conditions
@@ -19,6 +17,9 @@ from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.machines.planar import PlanarMachine
 from flexik.multibody.planar import tips
 from flexik.parameters.conditions import Points
+from flexik.planar.conditions import at_points
+from flexik.planar.machine import columns_of, model_inputs
+from flexik.planar.methods import method_inputs, method_settings, trained_method
 from flexik.positioning.method import Columns, Method
 
 
@@ -41,12 +42,12 @@ def prepare(
     tolerances: list[float],
     points: Points,
     methods: dict[str, dict[str, Any]],
-    spring: Path,
+    constants: Path,
     sections: dict[str, Path],
     networks: dict[str, Path],
 ) -> Work:
     """Ask every method with every tolerance."""
-    crane = flexible(machine, spring)
+    crane = flexible(machine, constants)
     manipulator = CraneManipulator(crane.geometry)
     conditions = at_points(points, manipulator)
     items = []

@@ -52,14 +52,14 @@ def prepare(
     adaptation: Adaptation,
     methods: Mapping[str, combined.Settings],
     networks: Mapping[str, Path],
-    spring: Path,
+    constants: Path,
     sections: object,
 ) -> Work:
     """A table of ADAPTATION; an item is a crane.
 
     methods, networks : by name, of the method that is adapted and of that of the campaign.
     """
-    crane = flexible(machine, spring)
+    crane = flexible(machine, constants)
     read = {name: read_network(path) for name, path in networks.items()}
     baselines = {name: compensating(crane, methods[name], read[name]) for name in methods}
     study = Study(crane, read[adaptation.method], baselines, campaign, adaptation)

@@ -50,7 +50,7 @@ def prepare(
     budget: Budget,
     method: combined.Settings,
     network: Path,
-    spring: Path,
+    constants: Path,
     sections: object,
     restarts: Path | None = None,
 ) -> Work:
@@ -59,7 +59,7 @@ def prepare(
     `.restarts.parquet` is one of cranes without deviations, each compensated by the network of
     another of the `restarts` of which `network` is the best; `twin` is the restart.
     """
-    crane, given = flexible(machine, spring), campaign.deviations
+    crane, given = flexible(machine, constants), campaign.deviations
     strokes, query = approaches(crane, method, read_network(network), campaign)
     items = [Item(k, kinds(given, budget.factor), strokes) for k in range(budget.n_cranes)]
     others = {} if restarts is None else load_restarts(restarts)

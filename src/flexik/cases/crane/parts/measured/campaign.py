@@ -35,11 +35,11 @@ def prepare(
     campaign: Campaign,
     method: combined.Settings,
     network: Path,
-    spring: Path,
+    constants: Path,
     sections: object,
 ) -> Work:
     """The campaign on a crane as built; `sections`, tables of the beams, are named by `machine`."""
-    crane = flexible(machine, spring)
+    crane = flexible(machine, constants)
     strokes, query = approaches(crane, method, read_network(network), campaign)
     return whole(measure, crane=crane, campaign=campaign, strokes=strokes, query=query)
 

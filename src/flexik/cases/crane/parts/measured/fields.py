@@ -1,16 +1,16 @@
 """Columns of the tables of the measured crane."""
 
-from flexik.cases.crane.parts.fields import QUERY_FIELDS, SAMPLE_FIELDS
-from flexik.cases.crane.parts.fields import STROKES as STROKE_NAMES
+from flexik.cases.crane.parts import fields
 from flexik.datasets.tables import Field
+from flexik.planar.fields import QUERY
 
 METHODS = ("none", "combined")  # without and with compensation
 # Methods adapted by measurements, to right and to wrong expectations
 ADAPTED, MISJUDGED = "adapted", "misjudged"
 
 TARGET = ["target_x", "target_y"]
-STROKES = list(STROKE_NAMES)
-CONDITION, STROKE = QUERY_FIELDS, SAMPLE_FIELDS[:3]
+STROKES = list(fields.STROKES)
+CONDITION, STROKE = QUERY, fields.STROKE_FIELDS
 MEASURED = ["measured_x", "measured_y"]
 
 # A campaign of one's own may lack targets and methods, or strokes: NaN and no text

@@ -46,7 +46,7 @@ def prepare(
     method: combined.Settings,
     campaign: Path,
     network: Path,
-    spring: Path,
+    constants: Path,
     sections: object,
 ) -> Work:
     """Tables of identified offsets, of predictions and of commands.
@@ -57,7 +57,7 @@ def prepare(
     """
     return whole(
         identified,
-        crane=flexible(machine, spring),
+        crane=flexible(machine, constants),
         network=read_network(network),
         campaign=read_table(campaign, CAMPAIGN),
         expected=expected,

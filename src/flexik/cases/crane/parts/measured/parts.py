@@ -2,11 +2,11 @@
 
 from typing import Any
 
-from flexik.cases.crane.parts.crane import model_inputs
 from flexik.cases.crane.parts.measured import adaptation, budget, campaign, identified
-from flexik.cases.crane.parts.methods import method_settings
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part
+from flexik.planar.machine import model_inputs
+from flexik.planar.methods import method_settings
 
 
 def measured_parts(section: Section) -> list[Part]:

@@ -4,23 +4,22 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from flexik.cases.crane.section import Section
 from flexik.datasets.tables import read_table
 from flexik.errors import ParameterError
-from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.manipulator import Manipulator
 from flexik.learning.storage import load_network
+from flexik.planar.section import PlanarSection
 from flexik.positioning.method import Ingredients, Method, Network, Settings
 from flexik.positioning.registry import Build, build_of
 
 
-def method_settings(section: Section, name: str) -> dict[str, Any]:
+def method_settings(section: PlanarSection, name: str) -> dict[str, Any]:
     """Settings `method` and `build` of a part that asks method `name` of params.yaml."""
     method = section.methods[name].model_copy(update={"n_targets": None})
     return {"method": method, "build": build_of(method)}
 
 
-def method_inputs(section: Section, name: str) -> dict[str, Any]:
+def method_inputs(section: PlanarSection, name: str) -> dict[str, Any]:
     """Inputs `network` and `samples`, those that method `name` is built from."""
     method = section.methods[name]
     samples = {name: section.data / "samples" / f"{name}.parquet" for name in method.reads}
@@ -44,7 +43,7 @@ def trained_method(
     return build(method, Ingredients(manipulator, network, tables))
 
 
-def method_of(section: Section, name: str) -> Method:
+def method_of(section: PlanarSection, name: str) -> Method:
     """Method `name` of params.yaml, read from the data of the pipeline.
 
     Raises ParameterError if there is no such method.
@@ -52,6 +51,6 @@ def method_of(section: Section, name: str) -> Method:
     if name not in section.methods:
         known = ", ".join(section.methods)
         raise ParameterError(f"{section.name}.methods: there is no {name!r} ({known})")
-    manipulator = CraneManipulator(section.geometry)
+    manipulator = section.manipulator
     inputs = method_inputs(section, name)
     return trained_method(**method_settings(section, name), manipulator=manipulator, **inputs)

@@ -1,0 +1,1 @@
+"""Any planar flexible machine of a file."""

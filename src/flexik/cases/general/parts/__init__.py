@@ -1,0 +1,1 @@
+"""Parts of the stages, those that all planar machines share."""

@@ -1,0 +1,211 @@
+"""The report of a planar machine of a file: tables, figures, metrics and page."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from flexik.cases.general.section import Section
+from flexik.datasets.tables import read_table
+from flexik.evaluation.errors import workspace_statistics
+from flexik.files import read_json
+from flexik.learning.storage import load_network
+from flexik.machines.bodies import Beam
+from flexik.parameters.conditions import RandomTargets
+from flexik.planar.picture import picture
+from flexik.planar.samples import counts
+from flexik.reporting import kinds, plane, style
+from flexik.reporting.chart import Axis
+from flexik.reporting.report import Content, Drawing, draw, write_case
+from flexik.reporting.style import MM
+from flexik.reporting.tables import Column, Table, mm, table
+
+# Cells of a map along the longer side of its area
+CELLS = 40
+# Parts of the payloads that a table tells apart
+THIRDS = ("lower third", "middle third", "upper third")
+
+
+@dataclass(frozen=True)
+class Results:
+    """What the stages made; SI units."""
+
+    section: Section
+
+    @cached_property
+    def errors(self) -> dict[str, dict[str, pd.DataFrame]]:
+        """Tables of errors by conditions and method."""
+        folder, section = self.section.data / "errors", self.section
+        return {
+            name: {m: read_table(folder / name / f"{m}.parquet") for m in section.methods}
+            for name in section.conditions
+        }
+
+    @cached_property
+    def statistics(self) -> dict[str, pd.DataFrame]:
+        """Statistics by conditions, a row a method."""
+        return {
+            name: pd.DataFrame([{"method": m, **workspace_statistics(f)} for m, f in of.items()])
+            for name, of in self.errors.items()
+        }
+
+    @cached_property
+    def networks(self) -> pd.DataFrame:
+        """A row a network: the restarts that were compared, and the kept one."""
+        rows = []
+        for name, network in self.section.networks.items():
+            folder = self.section.data / "networks"
+            restarts = pd.read_csv(folder / f"{name}.restarts.csv")
+            found = restarts["selection_error"]
+            rows.append(
+                {
+                    "network": name,
+                    "learns": network.learns or f"what {network.corrects} lacks",
+                    "hidden": len(load_network(folder / f"{name}.json")[0].weights[0]),
+                    "restarts": len(restarts),
+                    "trainer": network.trainer,
+                    "least": found.min(),
+                    "median": found.median(),
+                    "largest": found.max(),
+                }
+            )
+        return pd.DataFrame(rows)
+
+    @cached_property
+    def samples(self) -> dict[str, pd.DataFrame]:
+        """`grid` and `selection`."""
+        folder = self.section.data / "samples"
+        return {name: read_table(folder / f"{name}.parquet") for name in ("grid", "selection")}
+
+    @cached_property
+    def shape(self) -> dict[str, Any]:
+        """The sample that the picture shows."""
+        found: dict[str, Any] = read_json(self.section.data / "studies/shape.json")
+        return found
+
+
+def report(section: Section) -> None:
+    """Write reports/NAME from data/NAME."""
+    results = Results(section)
+    content = Content(tables(results), figures(results), metrics(results), values(results))
+    write_case(section, Path(__file__).with_name("page.md.j2"), content, section.files)
+
+
+def tables(results: Results) -> dict[str, Table]:
+    """By name."""
+    statistics = {
+        **{name: name for name in ("method",)},
+        "mean (mm)": mm("mean_error", 3),
+        "median (mm)": mm("median_error", 3),
+        "95 % (mm)": mm("p95_error", 3),
+        "99 % (mm)": mm("p99_error", 3),
+        "max (mm)": mm("max_error", 3),
+        "failed": "n_failed",
+    }
+    found = {f"errors_{k}": table(rows, statistics) for k, rows in results.statistics.items()}
+    for name, given in results.section.conditions.items():
+        if isinstance(given, RandomTargets):
+            found[f"payload_{name}"] = _by_payload(results.errors[name])
+    errors = {name: Column(name, 6) for name in ("least", "median", "largest")}
+    told = ("network", "learns", "hidden", "restarts", "trainer")
+    found["networks"] = table(results.networks, {name: name for name in told} | errors)
+    return found | {"bodies": _bodies(results.section), "drives": _drives(results.section)}
+
+
+def _by_payload(errors: dict[str, pd.DataFrame]) -> Table:
+    """Mean errors (mm) of every method by thirds of the payloads."""
+    rows = []
+    for method, frame in errors.items():
+        third = pd.qcut(frame["payload"], 3, labels=list(THIRDS))
+        means = MM * frame["error"].groupby(third, observed=True).mean()
+        rows.append({"method": method, **{f"{t} (mm)": means.get(t, np.nan) for t in THIRDS}})
+    return Table(pd.DataFrame(rows), 3)
+
+
+def _bodies(section: Section) -> Table:
+    masses = list(section.machine.masses().values())
+    rows = []
+    for name, body in section.machine.bodies.items():
+        length = body.span[1] - body.span[0] if isinstance(body, Beam) else None
+        mass = sum(kilograms for of, _, kilograms in masses if of == name)
+        told = {"body": name, "bends": "no" if length is None else "yes"}
+        rows.append(told | {"length (m)": length, "mass (kg)": mass})
+    return Table(pd.DataFrame(rows), {"length (m)": 3, "mass (kg)": 1})
+
+
+def _drives(section: Section) -> Table:
+    rows = [
+        {
+            "drive": name,
+            "kind": drive.kind,
+            "least": drive.limits[0],
+            "largest": drive.limits[1],
+            "unit": "rad" if drive.kind == "revolute" else "m",
+        }
+        for name, drive in section.machine.drives.items()
+    ]
+    return Table(pd.DataFrame(rows), 3)
+
+
+def figures(results: Results) -> dict[str, Drawing]:
+    """By name."""
+    found = {"machine": picture(results.section.machine, results.shape)}
+    looks = style.looks(results.section.methods)
+    for name, given in results.section.conditions.items():
+        frame = pd.concat([f.assign(method=m) for m, f in results.errors[name].items()])
+        axis = Axis("error (mm)", MM, log=True)
+        found[f"distribution_{name}"] = draw(
+            kinds.distribution, frame, "error", "method", axis, looks=looks
+        )
+        if isinstance(given, RandomTargets):
+            side = max(np.ptp(given.x), np.ptp(given.y)) / CELLS
+            columns = "target_x", "target_y", "error", "method"
+            found[f"map_{name}"] = draw(
+                plane.maps,
+                frame,
+                *columns,
+                label="error (mm)",
+                scale=MM,
+                cell=round(side, 2) or None,
+            )
+    return found
+
+
+def metrics(results: Results) -> dict[str, float | None]:
+    """Flat; lengths in mm."""
+    found: dict[str, float | None] = {}
+    for name, rows in results.statistics.items():
+        for row in rows.to_dict("records"):
+            key = f"{name}.{row['method']}"
+            lengths = {k: v for k, v in row.items() if str(k).endswith("_error")}
+            found |= {f"{key}.{k}_mm": round(MM * v, 4) for k, v in lengths.items()}
+            found[f"{key}.n_failed"] = row["n_failed"]
+    for name, samples in results.samples.items():
+        found |= {f"{name}.{key}": n for key, n in counts(samples).items()}
+    for row in results.networks.to_dict("records"):
+        for which in ("least", "median", "largest"):
+            found[f"{row['network']}.{which}_selection_error"] = round(row[which], 9)
+    return found
+
+
+def values(results: Results) -> dict[str, Any]:
+    """What the sentences of the page hold."""
+    random = [n for n, g in results.section.conditions.items() if isinstance(g, RandomTargets)]
+    judged = (random or list(results.section.conditions))[0]
+    rows = results.statistics[judged].set_index("method")
+    best = rows["mean_error"].idxmin()
+    return {
+        "section": results.section,
+        "machine": results.section.machine,
+        "judged": judged,
+        "random": random,
+        "best": best,
+        "rows": rows.to_dict("index"),
+        "counted": {name: counts(frame) for name, frame in results.samples.items()},
+        "mass": sum(mass for _, _, mass in results.section.machine.masses().values()),
+        "sag": float(np.hypot(*np.subtract(results.shape["tip"], results.shape["rigid_tip"]))),
+        "shape": results.shape,
+    }

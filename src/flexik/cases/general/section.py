@@ -1,0 +1,43 @@
+"""The section of any planar flexible machine in params.yaml."""
+
+from typing import Self
+
+from pydantic import model_validator
+
+from flexik.parameters.model import Model, NotNegative
+from flexik.planar.section import PlanarSection, check
+
+__all__ = ["Section", "check"]
+
+
+class Picture(Model):
+    """Sample drawn in the picture: coordinates in m or rad, payload in kg."""
+
+    values: list[float]
+    payload: NotNegative
+
+
+class Studies(Model):
+    """picture: None: all drives in the middle of their limits, the largest payload of the grid."""
+
+    picture: Picture | None = None
+
+
+class Section(PlanarSection):
+    """A machine whose constants are all known."""
+
+    studies: Studies = Studies()
+
+    @model_validator(mode="after")
+    def _is_known(self) -> Self:
+        if free := self.machine.free:
+            raise ValueError(f"machine.{free[0]}: expected a value; this case fits none")
+        for name, network in self.networks.items():
+            if network.learns == "coordinates" and len(self.machine.drives) != 2:
+                raise ValueError(
+                    f"networks.{name}.learns: coordinates need a machine of two drives"
+                )
+        shown = self.studies.picture
+        if shown is not None and len(shown.values) != len(self.machine.drives):
+            raise ValueError(f"studies.picture.values: expected {len(self.machine.drives)} of them")
+        return self

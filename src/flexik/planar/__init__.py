@@ -1,0 +1,1 @@
+"""What the cases of planar flexible machines share: their section, columns and parts."""

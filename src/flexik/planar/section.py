@@ -1,0 +1,144 @@
+"""The section of a planar flexible machine in params.yaml."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from flexik.errors import ParameterError
+from flexik.kinematics.machine_file import check_machine, manipulator_of
+from flexik.kinematics.manipulator import Manipulator
+from flexik.machines.planar import PlanarMachine
+from flexik.parameters.conditions import ConditionSet, Points
+from flexik.parameters.model import Count, Model, Name, NotNegative, Seed, Share
+from flexik.parameters.networks import Axis, Network, check_networks
+from flexik.parameters.section import CaseSection
+from flexik.positioning.registry import Methods, check_methods
+
+# Coordinates this close are the same, m or rad
+SAME = 1e-9
+# Places a side of the raster on which an area must have one that is reached
+RASTER = 40
+# Most samples of a grid
+MOST_SAMPLES = 10_000_000
+
+
+class Selection(Model):
+    """Random set that chooses among restarts."""
+
+    n_samples: Count
+    payload: tuple[NotNegative, NotNegative]
+    seed: Seed
+
+
+class Samples(Model):
+    """Poses to learn from and to select by; left out are those with the tip behind a limit.
+
+    grid : values of every drive, m or rad, and of the payload, kg.
+    minimum_tip_x : m; None: there is no limit.
+    """
+
+    grid: dict[Name, Axis]
+    selection: Selection
+    minimum_tip_x: float | None = None
+    maximum_failed_share: Share = 0.01
+
+
+class PlanarNetwork(Network):
+    """A network of a planar machine."""
+
+    learns: Literal["deflection", "tip", "rigid_tip", "coordinates"] | None = None
+
+
+class PlanarSection(CaseSection):
+    """A planar flexible machine."""
+
+    machine: PlanarMachine
+    samples: Samples
+    networks: Annotated[dict[Name, PlanarNetwork], Field(min_length=1)]
+    conditions: dict[Name, ConditionSet]
+    methods: Methods
+
+    @property
+    def manipulator(self) -> Manipulator:
+        """Rigid kinematics."""
+        return manipulator_of(self.machine)
+
+    @property
+    def files(self) -> list[Path]:
+        """Section tables."""
+        return [Path(file) for file in self.machine.section_files.values()]
+
+    @model_validator(mode="after")
+    def _fits_its_machine(self) -> Self:
+        self._check_grid()
+        check_networks(self.networks, self.trainers)
+        for name, network in self.networks.items():
+            if network.corrects and self.networks[network.corrects].learns != "rigid_tip":
+                raise ValueError(f"networks.{name}.corrects: expected a network of the rigid_tip")
+            if len(network.layers) != 1:
+                raise ValueError(f"networks.{name}.n_hidden: expected one layer")
+        check_methods(self.methods, self.networks)
+        if "none" not in self.methods:
+            raise ValueError("methods.none: expected, the others are compared with it")
+        if taken := self.conditions.keys() & type(self.samples).model_fields.keys():
+            raise ValueError(f"conditions.{min(taken)}: the name is taken")
+        return self
+
+    def _check_grid(self) -> None:
+        drives, grid = self.machine.drives, self.samples.grid
+        if missing := [name for name in (*drives, "payload") if name not in grid]:
+            raise ValueError(f"samples.grid.{missing[0]}: this key is missing")
+        n_samples = 1
+        for name, axis in grid.items():
+            n_samples *= axis.n_values
+            if name not in (*drives, "payload"):
+                known = ", ".join([*drives, "payload"])
+                raise ValueError(f"samples.grid.{name}: unknown, expected one of {known}")
+            low, high = drives[name].limits if name in drives else (0.0, np.inf)
+            if axis.minimum < low - SAME or axis.maximum > high + SAME:
+                raise ValueError(f"samples.grid.{name}: expected values from {low:g} to {high:g}")
+        if n_samples > MOST_SAMPLES:
+            raise ValueError(f"samples.grid: {n_samples:.3g} samples, at most {MOST_SAMPLES:.0g}")
+
+
+def check(section: PlanarSection, others: Mapping[str, Any] | None = None) -> None:
+    """The machine is one, and targets are reached: those of conditions, and `others` by key.
+
+    Raises ParameterError naming the key.
+    """
+    try:
+        check_machine(section.machine)
+    except ValueError as error:
+        raise ParameterError(f"{section.machine_file}: {error}") from None
+    sets = {f"conditions.{name}": given for name, given in section.conditions.items()}
+    for key, given in (sets | dict(others or {})).items():
+        if isinstance(given, Points):
+            points = np.array(given.points)
+            missed = np.flatnonzero(~_reached(section, points))
+            if missed.size:
+                x, y = points[missed[0]]
+                more = f", nor {missed.size - 1} others" if missed.size > 1 else ""
+                raise ParameterError(
+                    f"params.yaml: {section.name}.{key}.points.{missed[0]}: the rigid machine does "
+                    f"not reach ({x:g}, {y:g}) m{more}"
+                )
+        elif not _reached(section, _raster(section, given.x, given.y)).any():
+            raise ParameterError(
+                f"params.yaml: {section.name}.{key}: the machine reaches nothing in x, y"
+            )
+
+
+def _reached(section: PlanarSection, points: np.ndarray) -> np.ndarray:
+    manipulator = section.manipulator
+    middle = np.tile((manipulator.lower + manipulator.upper) / 2, (len(points), 1))
+    return manipulator.inverse(points, middle).reached
+
+
+def _raster(section: PlanarSection, x: tuple[float, float], y: tuple[float, float]) -> np.ndarray:
+    axes = np.meshgrid(*(np.linspace(*limits, RASTER) for limits in (x, y)))
+    points = np.column_stack([axis.ravel() for axis in axes])
+    least = section.samples.minimum_tip_x
+    return points if least is None else points[points[:, 0] >= least]
