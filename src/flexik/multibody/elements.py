@@ -242,8 +242,9 @@ def spring(system: exu.MainSystem, markers: list[int], x: Any, y: Any) -> None:
     connector = {"objectType": "ConnectorRigidBodySpringDamper", "markerNumbers": markers}
     system.AddObject({**connector, "stiffness": stiffness})
     if not (x and y):
+        # a pad's line turns with its second marker, and the spring is the first one's
         along = 0.0 if x else np.pi / 2
-        pad(system, markers[0], along, markers[1], along)
+        pad(system, markers[1], along, markers[0], along)
 
 
 def hang(system: exu.MainSystem, marker: int, mass: float, gravity: float) -> int:
