@@ -81,6 +81,11 @@ class FlexibleMachine:
             for slide, (a, b) in zip(slides, ends, strict=True)
         ]
 
+    def tilt(self, name: str) -> float:
+        """Angle of the markers on a body in its frame, rad: ANCF nodes turn with the axis."""
+        beam = self.machine.beams.get(name)
+        return beam.place(beam.start)[1] if beam and self.machine.element == "ancf" else 0.0
+
     def touched(self, poses: Array) -> Array:
         """Where pads touch with the bodies at `poses` (n, b, 3), (n, slides, 2, 2) in m.
 

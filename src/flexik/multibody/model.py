@@ -246,8 +246,7 @@ class PlanarModel:
         if isinstance(body, bodies.Beam):
             mesh = meshes[name]
             places = places_of(body, mesh.stations)
-            tilt = body.place(body.start)[1] if self.machine.element == "ancf" else 0.0
-            element = self.machine.element
+            tilt, element = self.flexible.tilt(name), self.machine.element
             return place_beam(self.system, element, mesh, np.zeros(2), 0.0, places, tilt)
         node = self.system.AddNode({"nodeType": "RigidBody2D"})
         rigid = self.system.AddObject({"objectType": "RigidBody2D", "nodeNumber": node})
@@ -342,8 +341,9 @@ class PlanarModel:
         ):
             moving = self._at(outer, on_outer), self._at(inner, on_inner)
             own = self._at(inner, first), self._at(outer, second)
-            # the line of sliding in the frame of either body
-            in_inner, in_outer = slide.direction, slide.direction - slide.angle
+            # the line of sliding in the frame of the markers on either body
+            in_inner = slide.direction - self.flexible.tilt(inner)
+            in_outer = slide.direction - slide.angle - self.flexible.tilt(outer)
             pad(self.system, moving[0], in_outer, own[0], in_inner)
             if any(slide is joint for joint in held):
                 pin(self.system, moving[1], own[1])
