@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from planar_machines import machine, pin, rigid
-from test_planar_statics import G, beam, sag, turning
+from test_planar_statics import EI, G, beam, drawn, sag, shipped, turning
 
 from flexik.multibody.flexible import FlexibleMachine
-from flexik.multibody.planar import tips
+from flexik.multibody.planar import solve, tips
 
 STIFF = {"kind": "box", "width": 0.3, "height": 0.6, "wall": 0.05}
 
@@ -80,3 +80,32 @@ def test_pads_do_not_depend_on_the_frames_of_the_bodies(element, drive):
     for direction, turned in ((0.5, 0.3), (-0.4, -0.8)):
         found = tips(FlexibleMachine(lifted(element, drive, direction, turned)), values, payload)
         assert found == pytest.approx(expected, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("length", "n_elements", "origin"), [(2.0, 500, 0.0), (0.2, 50, 0.0), (1.0, 60, 95.0)]
+)
+def test_round_off_of_short_elements_is_no_missing_equilibrium(length, n_elements, origin):
+    arm = beam([[0, 0], [length, 0]], n_elements=n_elements, a=[0, 0], tip=[length, 0])
+    given = machine(
+        {"a": [origin, origin]},
+        {"arm": arm},
+        {"a": pin("ground.a", "arm.a")},
+        {"turn": turning("a")},
+        "arm.tip",
+    )
+    values, payload = np.linspace(-1.0, 1.0, 9)[:, None], np.linspace(0.0, 100.0, 9)
+    assert not solve(FlexibleMachine(given), values, payload)[1]
+    sunk = sag(given, 100.0)[1]
+    assert sunk == pytest.approx(-100.0 * G * length**3 / (3 * EI), rel=1e-3, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "payload"), [("excavator", 3000.0), ("concrete_pump", 300.0), ("elastic_arm", 1.0)]
+)
+def test_meshes_sixteen_times_finer_are_solved(name, payload):
+    fine, usual = shipped(name, 16), shipped(name)
+    values, mass = drawn(usual, 8, payload)
+    found, failures = solve(fine, values, mass)
+    assert not failures
+    assert found == pytest.approx(tips(usual, values, mass), abs=2e-3)

@@ -89,6 +89,13 @@ class Elements:
     residual_flexibility: Array
     node_mass: Array
 
+    @property
+    def noise(self) -> float:
+        """Norm of the forces in all elements over the round-off of the nodes' places, N/m."""
+        along = self.axial_stiffness / np.diff(self.stations)
+        # across the axis a short element is the stiffer one
+        return float(np.linalg.norm(np.maximum(along, 1.0 / self.residual_flexibility)))
+
 
 def discretise(
     beam: Beam, pins: Sequence[tuple[float, ...]], refinement: int = 1

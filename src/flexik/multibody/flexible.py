@@ -65,6 +65,12 @@ class FlexibleMachine:
         return Linkage(self.machine, self.near)
 
     @cached_property
+    def size(self) -> float:
+        """How far from the origin of the ground its beams reach at most, about, m."""
+        farthest = np.abs(self.linkage.starts[1][..., :2]).max()
+        return float(farthest + max((np.ptp(b.span) for b in self.beams.values()), default=0.0))
+
+    @cached_property
     def beams(self) -> dict[str, Beam]:
         """What bends, along its abscissa."""
         return {

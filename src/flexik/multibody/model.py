@@ -30,9 +30,9 @@ from flexik.multibody.elements import (
 )
 from flexik.multibody.flexible import FlexibleMachine, feet_of, mass_offset, places_of
 
-# Newton's residual over the weight of machine and payload; below the round-off of the stiffest
-# element stretched over the size of the machine, so many last digits, nothing falls further
-TOLERANCE, LAST_DIGITS = 1e-6, 3.0
+# Newton's residual over the weight of machine and payload; and, of the forces that the last digit
+# of the size of the machine makes in all elements, the share below which none may fall: 0.1 to 0.7
+TOLERANCE, LAST_DIGITS = 1e-6, 1.5
 # Share of all loads, and step of the payload, below which a stubborn equilibrium is given up
 SMALLEST_LOAD_STEP, SMALLEST_RAMP = 0.05, 1e-4
 
@@ -74,9 +74,7 @@ class PlanarModel:
         self._unshifted: dict[int, list[float]] = {}
         # in m, and more than a turn: what bends so far is an equilibrium on paper alone
         self._longest = 2 * np.pi + sum(np.ptp(beam.span) for beam in self.machine.beams.values())
-        stiffest = [(1.0 / m.residual_flexibility).max() for m in meshes.values()]
-        last_digit = float(np.finfo(float).eps) * max(stiffest, default=0.0) * self._longest
-        self._round_off = LAST_DIGITS * last_digit
+        self._noise = {name: mesh.noise for name, mesh in meshes.items()}
         self._angles = np.zeros(1 + len(self.bodies))
         self._meshes: Mapping[str, Elements] = {}
         self._solved: list[tuple[float, Array, Array]] = []
@@ -105,6 +103,7 @@ class PlanarModel:
             return
         self._meshes = meshes
         for name, mesh in meshes.items():
+            self._noise[name] = mesh.noise
             self.beams[name].reshape(mesh, places_of(self.machine.beams[name], mesh.stations))
             for load, mass in zip(self._weights[name], mesh.node_mass, strict=True):
                 weigh(self.system, load, mass, self.machine.gravity)
@@ -197,8 +196,9 @@ class PlanarModel:
         weigh(self.system, self._payload, payload, self.machine.gravity)
         self._predict(payload)
         weight = self.machine.gravity * (self.weight + payload)
-        tolerance = max(TOLERANCE * weight, self._round_off)
-        _SETTINGS.staticSolver.newton.absoluteTolerance = tolerance
+        last_digit = float(np.finfo(float).eps) * self.flexible.size
+        round_off = LAST_DIGITS * last_digit * float(np.linalg.norm([*self._noise.values()]))
+        _SETTINGS.staticSolver.newton.absoluteTolerance = max(TOLERANCE * weight, round_off)
         if not solved(self.system, _SETTINGS):
             return False
         data = self.system.systemData
