@@ -2,11 +2,21 @@
 
 import numpy as np
 import pytest
-from planar_machines import machine, pin, rigid
+from planar_machines import FILES, machine, pin, rigid
 from test_planar_statics import EI, G, beam, drawn, sag, shipped, turning
 
+from flexik.errors import ParameterError
+from flexik.machines.planar import read_machine
 from flexik.multibody.flexible import FlexibleMachine
 from flexik.multibody.planar import solve, tips
+
+
+def arm_of(body, origin=0.0):
+    """A body on a drive at its point `a`."""
+    joints = {"a": pin("ground.a", "arm.a")}
+    drives = {"turn": turning("a")}
+    return machine({"a": [origin, origin]}, {"arm": body}, joints, drives, "arm.tip")
+
 
 STIFF = {"kind": "box", "width": 0.3, "height": 0.6, "wall": 0.05}
 
@@ -87,13 +97,7 @@ def test_pads_do_not_depend_on_the_frames_of_the_bodies(element, drive):
 )
 def test_round_off_of_short_elements_is_no_missing_equilibrium(length, n_elements, origin):
     arm = beam([[0, 0], [length, 0]], n_elements=n_elements, a=[0, 0], tip=[length, 0])
-    given = machine(
-        {"a": [origin, origin]},
-        {"arm": arm},
-        {"a": pin("ground.a", "arm.a")},
-        {"turn": turning("a")},
-        "arm.tip",
-    )
+    given = arm_of(arm, origin)
     values, payload = np.linspace(-1.0, 1.0, 9)[:, None], np.linspace(0.0, 100.0, 9)
     assert not solve(FlexibleMachine(given), values, payload)[1]
     sunk = sag(given, 100.0)[1]
@@ -109,3 +113,31 @@ def test_meshes_sixteen_times_finer_are_solved(name, payload):
     found, failures = solve(fine, values, mass)
     assert not failures
     assert found == pytest.approx(tips(usual, values, mass), abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("corner", "before"),
+    [
+        ("[0.02, 0.01]", "[2.2, 1.0], [3.0"),
+        ("[2.98, 1.05]", "[3.0, 1.05], [5.7"),
+        ("[5.68, 0.01]", "[5.7, 0.0]]"),
+    ],
+)
+def test_a_corner_that_would_share_a_node_is_a_line_that_names_the_axis(tmp_path, corner, before):
+    text = FILES["excavator"].read_text()
+    assert text.count(before) == 1
+    # beside the first end, beside another corner, beside the last end
+    path = tmp_path / "excavator.yaml"
+    path.write_text(text.replace(before, f"{corner}, {before}"))
+    with pytest.raises(ParameterError) as raised:
+        read_machine(path)
+    assert str(raised.value) == f"{path}: bodies.boom.axis: expected corners 0.03 m apart or more"
+
+
+def test_corners_as_far_apart_as_that_have_nodes():
+    axis = [[0, 0], [0.03, 0], [1.0, 0], [1.0, 0.03], [1.03, 0.03], [1.03, 1.0], [1.06, 1.0]]
+    flexible = FlexibleMachine(arm_of(beam(axis, a=[0, 0], tip=axis[-1])))
+    (meshes,) = flexible.meshes(np.zeros((1, 0, 2, 2)), ["arm"])
+    corners = np.cumsum(np.hypot(*np.diff(axis, axis=0).T))[:-1]
+    apart = np.abs(meshes["arm"].stations[:, None] - corners).min(axis=0)
+    assert apart == pytest.approx(np.zeros(len(corners)), abs=1e-12)

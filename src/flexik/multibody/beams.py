@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from flexik.machines.bodies import MERGE_DISTANCE
+from flexik.machines.bodies import MERGE_DISTANCE, TOLERANCE
 from flexik.machines.sections import Array, Section
 
 # Of the second moment of an element's flexibility, what its neighbour may take
@@ -114,7 +114,8 @@ def discretise(
 def _stations(span: tuple[float, float], pins: tuple[float, ...], longest: float) -> list[float]:
     stations = [span[0], span[1]]
     for pin in pins:
-        if min(abs(pin - s) for s in stations) > MERGE_DISTANCE:
+        # corners may be just as far apart, but for round-off
+        if min(abs(pin - s) for s in stations) > MERGE_DISTANCE - TOLERANCE:
             stations.append(pin)
     stations.sort()
     mesh = [stations[0]]
