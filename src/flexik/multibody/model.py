@@ -30,8 +30,8 @@ from flexik.multibody.elements import (
 )
 from flexik.multibody.flexible import FlexibleMachine, feet_of, mass_offset, places_of
 
-# Newton's residual over the weight of machine and payload; and, of the forces that the last digit
-# of the size of the machine makes in all elements, the share below which none may fall: 0.1 to 0.7
+# Newton's residual over the weight of machine and payload; and, where that is less, over the forces
+# in all elements by the last digit of the size of the machine: it falls to 0.1 to 0.7 of them
 TOLERANCE, LAST_DIGITS = 1e-6, 1.5
 # Share of all loads, and step of the payload, below which a stubborn equilibrium is given up
 SMALLEST_LOAD_STEP, SMALLEST_RAMP = 0.05, 1e-4
