@@ -17,7 +17,6 @@ from flexik.parameters.reading import PARAMETERS_FILE
 from flexik.parameters.section import DATA, MACHINES
 from flexik.planar.machine import flexible
 from flexik.planar.picture import picture
-from flexik.planar.section import PlanarSection
 from flexik.planar.shape import drawn
 from flexik.reporting.style import write_png
 
@@ -64,10 +63,10 @@ def check(name: str) -> list[str]:
     Returns what it is, a line each; raises ParameterError, one line a mistake.
     """
     section = cases.load(name)
-    if not isinstance(section, PlanarSection):
-        raise ParameterError(f"{name}: is no planar flexible machine of a file")
-    cases.check(section)
     machine = section.machine
+    if not isinstance(machine, PlanarMachine):
+        raise ParameterError(f"{section.machine_file}: describes no planar flexible machine")
+    cases.check(section)
     manipulator = manipulator_of(machine)
     share = np.random.default_rng(0).random((N_TIPS, len(machine.drives)))
     tips = manipulator.forward(manipulator.lower + share * (manipulator.upper - manipulator.lower))
@@ -79,7 +78,7 @@ def check(name: str) -> list[str]:
         return [*lines, f"not drawn: {', '.join(machine.free)} are fitted by `flexik run {name}`"]
     middle = (manipulator.lower + manipulator.upper) / 2
     solved = flexible(machine, constants if machine.free else None)
-    shape = drawn(solved, middle, section.samples.grid["payload"].maximum)
+    shape = drawn(solved, middle, section.largest_payload)
     sag = 1e3 * np.hypot(*np.subtract(shape["tip"], shape["rigid_tip"]))
     drawing, path = picture(machine, shape, tips), DATA / name / "check.png"
     write_png(path, drawing.func, *drawing.args, **drawing.keywords)

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from flexik.errors import ParameterError
 from flexik.kinematics.machine_file import check_machine, manipulator_of
@@ -16,6 +16,8 @@ from flexik.parameters.model import Count, Model, Name, NotNegative, Seed, Share
 from flexik.parameters.networks import Axis, Network, check_networks
 from flexik.parameters.section import CaseSection
 from flexik.positioning.registry import Methods, check_methods
+
+Part = Annotated[float, Field(gt=0, lt=1)]
 
 # Coordinates this close are the same, m or rad
 SAME = 1e-9
@@ -46,6 +48,36 @@ class Samples(Model):
     maximum_failed_share: Share = 0.01
 
 
+class OwnSamples(Model):
+    """Samples of a file in place of a model's, see planar.own_samples.
+
+    columns : headers of the file, by the name of the column that they stand for.
+    selection_share, held_out_share : of the rows, drawn by `seed`; the others are learnt from.
+    """
+
+    file: str
+    columns: Annotated[dict[Name, str], Field(default_factory=dict)]
+    selection_share: Part = 0.2
+    held_out_share: Part = 0.2
+    seed: Seed = 0
+
+    @model_validator(mode="after")
+    def _leaves_some(self) -> Self:
+        if self.selection_share + self.held_out_share >= 1.0:
+            raise ValueError("held_out_share: leaves nothing to learn from")
+        return self
+
+
+def _which(given: Any) -> str:
+    keys = given if isinstance(given, dict) else getattr(type(given), "model_fields", ())
+    return "file" if "file" in keys else "grid"
+
+
+AnySamples = Annotated[
+    Annotated[Samples, Tag("grid")] | Annotated[OwnSamples, Tag("file")], Discriminator(_which)
+]
+
+
 class PlanarNetwork(Network):
     """A network of a planar machine."""
 
@@ -67,9 +99,15 @@ class PlanarSection(CaseSection):
         return manipulator_of(self.machine)
 
     @property
+    def largest_payload(self) -> float:
+        """Of the grid that networks learn from, kg; zero where there is none."""
+        return self.samples.grid["payload"].maximum if isinstance(self.samples, Samples) else 0.0
+
+    @property
     def files(self) -> list[Path]:
-        """Section tables."""
-        return [Path(file) for file in self.machine.section_files.values()]
+        """Section tables, and samples of the user's own."""
+        own = [self.samples.file] if isinstance(self.samples, OwnSamples) else []
+        return [Path(file) for file in (*self.machine.section_files.values(), *own)]
 
     @model_validator(mode="after")
     def _fits_its_machine(self) -> Self:
@@ -88,6 +126,8 @@ class PlanarSection(CaseSection):
         return self
 
     def _check_grid(self) -> None:
+        if not isinstance(self.samples, Samples):
+            return
         drives, grid = self.machine.drives, self.samples.grid
         if missing := [name for name in (*drives, "payload") if name not in grid]:
             raise ValueError(f"samples.grid.{missing[0]}: this key is missing")

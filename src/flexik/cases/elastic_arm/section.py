@@ -194,6 +194,11 @@ class Section(CaseSection):
     studies: Studies
 
     @property
+    def largest_payload(self) -> float:
+        """Of the readings, kg."""
+        return max(self.samples.payloads)
+
+    @property
     def gauge_networks(self) -> dict[str, Network]:
         """Networks that are given gauges, by name."""
         return {name: network for name, network in self.networks.items() if network.has_gauges}

@@ -12,11 +12,15 @@ from flexik.cases.general.section import Section
 from flexik.datasets.tables import read_table
 from flexik.evaluation.errors import workspace_statistics
 from flexik.files import read_json
+from flexik.kinematics.status import REACHED
 from flexik.learning.storage import load_network
 from flexik.machines.bodies import Beam
 from flexik.parameters.conditions import RandomTargets
+from flexik.planar import held_out
+from flexik.planar.fields import deflection
 from flexik.planar.picture import picture
 from flexik.planar.samples import counts
+from flexik.planar.section import OwnSamples
 from flexik.reporting import kinds, plane, style
 from flexik.reporting.chart import Axis
 from flexik.reporting.report import Content, Drawing, draw, write_case
@@ -25,6 +29,8 @@ from flexik.reporting.tables import Column, Table, mm, table
 
 # Cells of a map along the longer side of its area
 CELLS = 40
+# What stands for rigid kinematics among the networks of held-out samples
+RIGID = "rigid kinematics"
 # Parts of the payloads that a table tells apart
 THIRDS = ("lower third", "middle third", "upper third")
 
@@ -75,10 +81,23 @@ class Results:
         return pd.DataFrame(rows)
 
     @cached_property
+    def held_out(self) -> dict[str, pd.DataFrame]:
+        """Errors of rigid kinematics and of networks on samples held out; none of a model's own."""
+        folder = self.section.data / "errors/held_out"
+        if not isinstance(self.section.samples, OwnSamples):
+            return {}
+        samples = read_table(self.section.data / "samples/held_out.parquet")
+        sag = np.hypot(*deflection(samples).T)
+        rigid = pd.DataFrame({"payload": samples["payload"], "error": sag})
+        names = [part.name.partition("/")[2] for part in held_out.parts(self.section)]
+        return {RIGID: rigid} | {n: read_table(folder / f"{n}.parquet") for n in names}
+
+    @cached_property
     def samples(self) -> dict[str, pd.DataFrame]:
-        """`grid` and `selection`."""
+        """`grid` and `selection`, and what was held out."""
         folder = self.section.data / "samples"
-        return {name: read_table(folder / f"{name}.parquet") for name in ("grid", "selection")}
+        names = ["grid", "selection", *(["held_out"] if self.held_out else [])]
+        return {name: read_table(folder / f"{name}.parquet") for name in names}
 
     @cached_property
     def shape(self) -> dict[str, Any]:
@@ -109,10 +128,18 @@ def tables(results: Results) -> dict[str, Table]:
     for name, given in results.section.conditions.items():
         if isinstance(given, RandomTargets):
             found[f"payload_{name}"] = _by_payload(results.errors[name])
+    if results.held_out:
+        found["held_out"] = table(_distances(results), statistics | {"method": "method"})
     errors = {name: Column(name, 6) for name in ("least", "median", "largest")}
     told = ("network", "learns", "hidden", "restarts", "trainer")
     found["networks"] = table(results.networks, {name: name for name in told} | errors)
     return found | {"bodies": _bodies(results.section), "drives": _drives(results.section)}
+
+
+def _distances(results: Results) -> pd.DataFrame:
+    """Statistics of the distances on held-out samples, a row a predictor."""
+    found = {name: f.assign(status=REACHED) for name, f in results.held_out.items()}
+    return pd.DataFrame([{"method": n, **workspace_statistics(f)} for n, f in found.items()])
 
 
 def _by_payload(errors: dict[str, pd.DataFrame]) -> Table:
@@ -171,6 +198,13 @@ def figures(results: Results) -> dict[str, Drawing]:
                 scale=MM,
                 cell=round(side, 2) or None,
             )
+    if results.held_out:
+        frame = pd.concat([f.assign(method=m) for m, f in results.held_out.items()])
+        axis = Axis("distance (mm)", MM, log=True)
+        what = {"what": "samples", "looks": style.looks(results.held_out)}
+        found["distribution_held_out"] = draw(
+            kinds.distribution, frame, "error", "method", axis, **what
+        )
     return found
 
 
@@ -183,6 +217,10 @@ def metrics(results: Results) -> dict[str, float | None]:
             lengths = {k: v for k, v in row.items() if str(k).endswith("_error")}
             found |= {f"{key}.{k}_mm": round(MM * v, 4) for k, v in lengths.items()}
             found[f"{key}.n_failed"] = row["n_failed"]
+    for name, frame in results.held_out.items():
+        errors = frame["error"]
+        for which, value in (("mean", errors.mean()), ("max", errors.max())):
+            found[f"held_out.{name}.{which}_error_mm"] = round(MM * value, 4)
     for name, samples in results.samples.items():
         found |= {f"{name}.{key}": n for key, n in counts(samples).items()}
     for row in results.networks.to_dict("records"):
@@ -194,10 +232,13 @@ def metrics(results: Results) -> dict[str, float | None]:
 def values(results: Results) -> dict[str, Any]:
     """What the sentences of the page hold."""
     random = [n for n, g in results.section.conditions.items() if isinstance(g, RandomTargets)]
-    judged = (random or list(results.section.conditions))[0]
-    rows = results.statistics[judged].set_index("method")
+    judged = (random or [*results.section.conditions, "held_out"])[0]
+    of_all = _distances(results) if results.held_out else results.statistics[judged]
+    rows = of_all.set_index("method")
     best = rows["mean_error"].idxmin()
     return {
+        "own": results.section.samples if results.held_out else None,
+        "rigid": RIGID,
         "section": results.section,
         "machine": results.section.machine,
         "judged": judged,

@@ -8,6 +8,6 @@ from flexik.planar import shape
 def parts(section: Section) -> list[Part]:
     """`shape`."""
     middle = [sum(drive.limits) / 2 for drive in section.machine.drives.values()]
-    largest = section.samples.grid["payload"].maximum
-    shown = section.studies.picture or Picture(values=middle, payload=largest)
+    loaded = Picture(values=middle, payload=section.largest_payload)
+    shown = section.studies.picture or loaded
     return [shape.part(section, shown.values, shown.payload)]

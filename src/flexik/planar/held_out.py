@@ -1,0 +1,47 @@
+"""Errors of networks on samples that they never saw: where they put the tip, and where it was."""
+
+from pathlib import Path
+
+import numpy as np
+
+from flexik.datasets.parts import Part, Work, Writer, table, whole
+from flexik.datasets.tables import Field, read_table
+from flexik.learning.storage import load_network
+from flexik.machines.planar import PlanarMachine
+from flexik.planar.fields import PAYLOAD, inputs, sample_fields
+from flexik.planar.section import PlanarSection
+
+FIELDS = (PAYLOAD, Field("error", "m", "distance of the predicted tip from that of the sample"))
+
+
+def parts(section: PlanarSection) -> list[Part]:
+    """`held_out/NETWORK` for every network of a tip, a deflection or a correction."""
+    shared = {"machine": section.machine}
+    samples = section.data / "samples/held_out.parquet"
+    return [
+        Part(
+            f"held_out/{name}",
+            prepare,
+            {**shared, "deflects": network.learns == "deflection"},
+            {"samples": samples, "network": section.data / f"networks/{name}.json"},
+        )
+        for name, network in section.networks.items()
+        if network.learns in ("deflection", "tip", None)
+    ]
+
+
+def prepare(*, machine: PlanarMachine, deflects: bool, samples: Path, network: Path) -> Work:
+    """A table of FIELDS."""
+    return whole(_errors, machine=machine, deflects=deflects, samples=samples, network=network)
+
+
+def _errors(
+    machine: PlanarMachine, deflects: bool, samples: Path, network: Path
+) -> dict[str, Writer]:
+    frame = read_table(samples, sample_fields(machine))
+    found = load_network(network)[0].predict(frame[inputs(machine)].to_numpy())
+    if deflects:
+        found = found + frame[["rigid_x", "rigid_y"]].to_numpy()
+    error = np.hypot(*(found - frame[["tip_x", "tip_y"]].to_numpy()).T)
+    print(f"{network.stem}: mean error {1e3 * error.mean():.3g} mm of {len(error)} held out")
+    return {".parquet": table({"payload": frame["payload"].to_numpy(), "error": error}, FIELDS)}
