@@ -5,17 +5,18 @@ interpolation between them, multilinear or by cubic splines.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 import pandas as pd
-from scipy.interpolate import NdBSpline, make_interp_spline
-from scipy.spatial import cKDTree
 
 from flexik.parameters.model import Count
 from flexik.positioning import method
 from flexik.positioning.combined import Combined
 from flexik.positioning.method import Array, PositioningError
+
+if TYPE_CHECKING:
+    from scipy.interpolate import NdBSpline
 
 # Degrees of the splines
 DEGREES = {"linear": 1, "cubic": 3}
@@ -37,7 +38,7 @@ class DeflectionTable:
     Beyond the grid it extrapolates.
     """
 
-    spline: NdBSpline
+    spline: "NdBSpline"
 
     @classmethod
     def of(cls, table: pd.DataFrame, interpolation: str) -> "DeflectionTable":
@@ -46,6 +47,10 @@ class DeflectionTable:
         Where a sample was left out or failed stands the deflection of the nearest one that was
         solved, in steps of the grid. Raises PositioningError if the samples are no full grid.
         """
+        # every stage imports this module, and few use it: these take most of a second
+        from scipy.interpolate import NdBSpline, make_interp_spline
+        from scipy.spatial import cKDTree
+
         names = [*table.columns[: list(table.columns).index("payload")], "payload"]
         points = table[names].to_numpy()
         axes, places = zip(*(np.unique(p, return_inverse=True) for p in points.T), strict=True)
