@@ -5,7 +5,7 @@ import shutil
 import crane_case
 import numpy as np
 import pytest
-from crane_case import KINDS, TARGET_FIELDS
+from crane_case import KINDS, SAMPLE_FIELDS, TARGET_FIELDS
 
 from flexik.cases.crane.parts import tolerance
 from flexik.cases.crane.section import SPRING
@@ -60,6 +60,8 @@ def project(tmp_path, monkeypatch):
     columns = dict(
         zip((f.name for f in TARGET_FIELDS), [*targets.T, *np.zeros((3, 3))], strict=True)
     )
+    grid = {f.name: np.zeros(1, dtype=f.dtype) for f in SAMPLE_FIELDS}
+    write_table(tmp_path / "data/crane/samples/grid.parquet", grid, SAMPLE_FIELDS)
     write_table(tmp_path / "data/crane/samples/workspace.parquet", columns, TARGET_FIELDS)
     for name, given in crane_case.section().networks.items():
         made = [

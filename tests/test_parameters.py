@@ -214,6 +214,7 @@ WRONG = [
     ("excavator.samples.grid.bucket", {"minimum": 0.0, "maximum": 1.0, "increment": 0.5}),
     ("excavator.samples.grid.boom.maximum", 1.365),
     ("excavator.samples.grid.payload.increment", 1.0e-3),
+    ("excavator.samples.selection.payload", [-5.0, 3000.0]),
     ("excavator.conditions.workspace.x", [50.0, 60.0]),
     ("excavator.studies", {"picture": {"values": [0.5], "payload": 100.0}}),
     ("fanuc.machine.joints.4.d", 0.1),

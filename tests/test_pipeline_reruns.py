@@ -28,7 +28,7 @@ from smoke_pipeline import (
 # one process, which makes the project once
 pytestmark = pytest.mark.xdist_group("pipeline")
 
-CASES = ("crane", "elastic_arm", "fanuc", "smartee")
+CASES = tuple(PARAMETERS["cases"])
 
 
 def succeeded(done):
@@ -137,9 +137,9 @@ def test_a_damaged_table_is_told_and_made_again(copy):
 
 
 def test_an_unknown_case_is_told(copy):
-    done = stage(copy, "train", "excavator")
+    done = stage(copy, "train", "digger")
     assert done.returncode == 1
-    assert "there is no case 'excavator'" in one_error(done)
+    assert "there is no case 'digger'" in one_error(done)
 
 
 def test_bytes_do_not_depend_on_the_workers(project, copy):

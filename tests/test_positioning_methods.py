@@ -5,8 +5,8 @@ import sys
 from dataclasses import dataclass
 from itertools import pairwise
 
-import crane_case
 import numpy as np
+import pandas as pd
 import pytest
 from elastic_arm import GEOMETRY as ARM
 from pydantic import TypeAdapter, ValidationError
@@ -136,12 +136,12 @@ def asked(crane, name, request):
     inside = low + generator.uniform(0.55, 0.75, (20, len(low))) * (high - low)
     payload = generator.uniform(0.0, 100.0, 20)
     chosen, tip = settings(name), manipulator.forward(inside)
-    samples = {}
-    if request.param == "crane":
-        columns = [*inside.T, payload, *tip.T, *tip.T, np.zeros(20)]
-        samples["grid"] = crane_case.samples(columns)
-    if not set(chosen.reads) <= samples.keys():
-        pytest.skip(f"{request.param} has no samples {chosen.reads}")
+    axes = [*(np.linspace(*ends, 4) for ends in zip(low, high, strict=True)), [0.0, 100.0]]
+    grid = np.column_stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")])
+    names = [*(f"coordinate_{k}" for k in range(len(low))), "payload"]
+    samples = {"grid": pd.DataFrame(grid, columns=names)}
+    for kind in ("rigid", "tip"):
+        samples["grid"][[f"{kind}_x", f"{kind}_y"]] = manipulator.forward(grid[:, :-1])
     network = network_for(chosen.needs, manipulator)
     if isinstance(network, Network):
         tip = network.predict(np.column_stack([inside, payload]))

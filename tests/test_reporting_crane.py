@@ -256,7 +256,10 @@ def test_methods_are_grouped_by_their_names(results):
     groups = results.groups
     assert groups["published"] == ["combined", "direct", "modular", "inverse"]
     assert groups["selected"] == [f"{name}_selected" for name in groups["published"]]
-    assert groups["variants"] == ["combined_ga", "direct_gauss_newton", "modular_gauss_newton"]
+    assert groups["variants"] == [
+        *("table_linear", "table_cubic"),
+        *("combined_ga", "direct_gauss_newton", "modular_gauss_newton"),
+    ]
 
 
 def test_operations_of_a_query_follow_from_method_and_network(results):

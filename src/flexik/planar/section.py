@@ -70,11 +70,12 @@ class OwnSamples(Model):
 
 def _which(given: Any) -> str:
     keys = given if isinstance(given, dict) else getattr(type(given), "model_fields", ())
-    return "file" if "file" in keys else "grid"
+    return "of_a_file" if "file" in keys else "of_a_model"
 
 
 AnySamples = Annotated[
-    Annotated[Samples, Tag("grid")] | Annotated[OwnSamples, Tag("file")], Discriminator(_which)
+    Annotated[Samples, Tag("of_a_model")] | Annotated[OwnSamples, Tag("of_a_file")],
+    Discriminator(_which),
 ]
 
 
