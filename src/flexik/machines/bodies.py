@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from flexik.machines.sections import Array, Section, SectionKind, plausible
-from flexik.parameters.model import Count, Model, Positive
+from flexik.machines.sections import Array, Section, SectionKind
+from flexik.parameters.model import Count, Model, Positive, plausible
 
 # Abscissas this close are the same, m
 TOLERANCE = 1e-6
@@ -56,7 +56,9 @@ class Angled(Model):
             if plain != key and plain in data:
                 raise ValueError(f"{plain}: stands twice, in rad and in degrees")
             entries = value if isinstance(value, list) else [value]
-            if plain != key and all(isinstance(entry, int | float) for entry in entries):
+            if plain != key and plain in cls.model_fields:
+                if not all(isinstance(entry, int | float) for entry in entries):
+                    raise ValueError(f"{key}: expected numbers, got {value!r}")
                 key, value = plain, np.radians(value).tolist()
             found[key] = value
         return found
@@ -187,7 +189,10 @@ class Beam(_Body):
             low, high = self.span
             first, last = self.mass_span
             if not low - TOLERANCE <= first < last <= high + TOLERANCE:
-                raise ValueError(f"mass_span: must increase and lie within {low:g} and {high:g} m")
+                raise ValueError(
+                    f"mass_span: expected two increasing values within {low:g} and {high:g} m, got "
+                    f"{first:g} and {last:g}"
+                )
         if self.centre is not None:
             first, last = self.mass_span or self.span
             if not first < self.foot(self.centre)[0] < last:

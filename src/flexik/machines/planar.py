@@ -29,8 +29,7 @@ from flexik.machines.bodies import (
     Reference,
     Rigid,
 )
-from flexik.machines.sections import plausible
-from flexik.parameters.model import Model
+from flexik.parameters.model import Model, check_increase, plausible
 from flexik.parameters.reading import read_yaml, validated
 
 GROUND = "ground"
@@ -97,8 +96,7 @@ class _Drive(Angled):
 
     @model_validator(mode="after")
     def _increases(self) -> Self:
-        if not self.limits[0] < self.limits[1]:
-            raise ValueError("limits: must increase")
+        check_increase(self, "limits")
         return self
 
 
@@ -247,16 +245,29 @@ class PlanarMachine(Angled):
         for group in ("joints", "drives"):
             for name, part in getattr(self, group).items():
                 self._check_pair(f"{group}.{name}", part)
+        driven: dict[str, str] = {}
+        for name, drive in self.drives.items():
+            if (joint := getattr(drive, "joint", None)) in driven:
+                raise ValueError(
+                    f"drives.{name}.joint: {joint} is driven by {driven[joint]} already"
+                )
+            driven |= {} if joint is None else {joint: name}
         for name, body in self.bodies.items():
             for point in body.masses:
                 if point not in body.points:
-                    raise ValueError(f"bodies.{name}.masses.{point}: the body has no such point")
+                    known = ", ".join(body.points)
+                    raise ValueError(
+                        f"bodies.{name}.masses.{point}: the body has no such point, only {known}"
+                    )
         for name, beam in self.beams.items():
             if self.shear == "included" and beam.shear_coefficient is None:
                 raise ValueError(f"bodies.{name}.shear_coefficient: missing, and shear is included")
         self._check_end(self.payload, "payload")
         if self.smallest_first is not None and self.smallest_first not in self.drives:
-            raise ValueError("smallest_first: expected the name of a drive")
+            raise ValueError(
+                f"smallest_first: expected the name of a drive ({', '.join(self.drives)}), got "
+                f"{self.smallest_first}"
+            )
         return self
 
     def _check_end(self, reference: str, key: str) -> str:
@@ -270,7 +281,11 @@ class PlanarMachine(Angled):
         if wanted:
             joint = self.joints.get(part.joint)
             if joint is None or joint.kind != wanted:
-                raise ValueError(f"{key}.joint: expected the name of a {wanted}")
+                known = [name for name, other in self.joints.items() if other.kind == wanted]
+                raise ValueError(
+                    f"{key}.joint: expected the name of a {wanted} ({', '.join(known) or 'none'}), "
+                    f"got {part.joint}"
+                )
         if part.kind == "revolute":
             return
         ends = [self._check_end(end, f"{key}.of") for end in part.of]
@@ -317,7 +332,7 @@ def _wrong_sections(machine: PlanarMachine, name: str) -> list[str]:
     try:
         section = beam.profile()
     except DataError as error:
-        return [f"{key}.section: {error}"]
+        return [f"{key}.section.file: {error}"]
     x, slack = section.abscissa, UNCOVERED * (high - low)
     if x[0] > low + slack or x[-1] < high - slack:
         covered = f"{x[0]:g} to {x[-1]:g} m"

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flexik.parameters.model import Count, Model, Name, NotNegative, Positive, Seed
+from flexik.parameters.model import Model, Name, NotNegative, Positive, Restarts, Seed, Units
 
 
 class Axis(Model):
@@ -18,9 +18,16 @@ class Axis(Model):
 
     @model_validator(mode="after")
     def _whole_steps(self) -> Self:
-        steps = (self.maximum - self.minimum) / self.increment
-        if self.maximum < self.minimum or abs(steps - round(steps)) > 1e-6:
-            raise ValueError("increment: maximum - minimum must be a whole number of increments")
+        least, most, steps = self.minimum, self.maximum, self.maximum - self.minimum
+        if most < least:
+            raise ValueError(f"maximum: expected the minimum, {least:g}, or more, got {most:g}")
+        steps /= self.increment
+        if abs(steps - round(steps)) > 1e-6:
+            raise ValueError(
+                f"increment: expected a whole number of increments from {least:g} to {most:g}, "
+                f"{self.increment:g} makes {steps:.4g}; {(most - least) / round(steps + 0.5):.6g} "
+                "would do"
+            )
         return self
 
     @property
@@ -32,9 +39,9 @@ class Axis(Model):
 class Sizes(Axis):
     """Numbers of hidden units of a layer to choose from."""
 
-    minimum: Count
-    maximum: Count
-    increment: Count
+    minimum: Units
+    maximum: Units
+    increment: Units
 
     def values(self) -> list[int]:
         """All of them."""
@@ -47,12 +54,12 @@ class Select(Model):
     The smallest size within the share `tolerance` of the least selection error is chosen.
     """
 
-    n_restarts: Count = 3
+    n_restarts: Restarts = 3
     tolerance: NotNegative = 0.0
     trainer: Name = "study"
 
 
-Layer = Count | Sizes
+Layer = Units | Sizes
 
 
 class Network(Model):
@@ -69,7 +76,7 @@ class Network(Model):
     n_hidden: Layer | Annotated[list[Layer], Field(min_length=1)]
     select: Select = Select()
     activation: Literal["tanh", "logistic"] = "tanh"
-    n_restarts: Count
+    n_restarts: Restarts
     seed: Seed = 1
     trainer: Name = "accelerated"
 
