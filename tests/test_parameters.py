@@ -7,9 +7,16 @@ from pathlib import Path
 import pytest
 import yaml
 
+from flexik import docs
 from flexik.cases import case as cases
 from flexik.errors import ParameterError
+from flexik.machines.bodies import Beam
+from flexik.machines.planar import PlanarMachine
+from flexik.parameters import describe
+from flexik.parameters.conditions import Points
 from flexik.parameters.reading import overlay, read_yaml
+from flexik.parameters.trainers import Trainer
+from flexik.planar.section import PlanarNetwork, Samples
 
 ROOT = Path(__file__).parents[1]
 FILES = [ROOT / "params.yaml", *sorted((ROOT / "data/machines").glob("*.yaml"))]
@@ -350,6 +357,28 @@ def test_overlay_replaces_leaves_and_leaves_the_rest():
     }
     assert base == before
     assert overlay(base, {}) == base
+
+
+def test_docs_are_those_of_the_models():
+    """`dvc repro readme` renews them."""
+    for name, text in docs.pages().items():
+        assert (ROOT / "docs" / name).read_text() == text, name
+    kinds = {"kind", "method"}  # told below the heading
+    for model in describe.models_in(PlanarMachine, Samples, Points, PlanarNetwork, Trainer):
+        bare = [key.name for key in describe.keys(model) if not key.text and key.name not in kinds]
+        assert not bare, model
+
+
+def test_docs_tell_units_ranges_and_defaults():
+    beam = {key.name: key for key in describe.keys(Beam)}
+    assert beam["youngs_modulus"].takes == "number, more than 0, Pa (1e+08 to 2e+12)"
+    assert beam["mass_span"].takes == "list of 2: number, m (up to 100)"
+    assert (
+        beam["section"].takes
+        == "[table](#table) or [box](#box) or [tube](#tube) or [solid](#solid)"
+    )
+    assert (beam["poisson"].default, beam["axis"].default) == ("0.3", "")
+    assert beam["angle"].text.startswith("of its frame")  # of the class that all bodies share
 
 
 def mappings(data):

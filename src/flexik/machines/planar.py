@@ -45,9 +45,10 @@ Pair = tuple[Reference, Reference]
 
 
 class Springs(Model):
-    """What gives way in a fixed joint, N m/rad and N/m: a value or `fit`; not given: it is rigid.
+    """What gives way in a fixed joint: a value or `fit`; not given: it is rigid.
 
-    x and y are of the inner body's frame.
+    torsion : N m/rad.
+    x, y : N/m, along the axes of the inner body's frame.
     """
 
     torsion: Free | None = None
@@ -56,7 +57,10 @@ class Springs(Model):
 
 
 class _Joint(Angled):
-    """`of`: the two points that it joins, of the inner and of the outer body."""
+    """What all joints have.
+
+    of : the two points that it joins, of the inner and of the outer body.
+    """
 
     of: Pair
 
@@ -68,7 +72,11 @@ class Pin(_Joint):
 
 
 class Fixed(_Joint):
-    """The two points are one, and the outer body stands at `angle` to the inner one."""
+    """The two points are one, and the outer body stands at an angle to the inner one.
+
+    angle : of the outer body's frame from the inner one's, rad.
+    springs : what gives way; not given: nothing.
+    """
 
     kind: Literal["fixed"]
     angle: Angle = 0.0
@@ -81,6 +89,7 @@ class Slide(_Joint):
     of : the pads. That of the inner body touches the outer body, on a line along `direction` in the
         inner one's frame; the other touches the inner body, on that line too. A telescope drive
         acts on the outer body's pad.
+    angle : of the outer body's frame from the inner one's, rad.
     direction : of sliding, in the frame of the inner body.
     """
 
@@ -90,7 +99,10 @@ class Slide(_Joint):
 
 
 class _Drive(Angled):
-    """limits: least and largest coordinate, m or rad."""
+    """What all drives have.
+
+    limits : least and largest coordinate, m or rad.
+    """
 
     limits: tuple[float, float]
 
@@ -101,9 +113,11 @@ class _Drive(Angled):
 
 
 class Cylinder(_Drive):
-    """Links two points `of` two bodies, `retracted` + stroke apart; the stroke is its coordinate.
+    """Links two points of two bodies, retracted + stroke apart; the stroke is its coordinate.
 
-    `masses` (kg) hang on the first and on the second point: what the cylinder weighs.
+    of : the two points.
+    retracted : distance of the points at stroke 0, m.
+    masses : kg that hang on the first and on the second point: what the cylinder weighs.
     """
 
     kind: Literal["cylinder"]
@@ -120,9 +134,12 @@ class Cylinder(_Drive):
 
 
 class Telescope(_Drive):
-    """Moves the outer body of the slide `joint`.
+    """Moves the outer body of a slide; the stroke is its coordinate.
 
-    The second point `of` lies `retracted` + stroke ahead of the first, along the slide.
+    joint : name of the slide.
+    of : points of its inner and of its outer body; the second lies retracted + stroke ahead of the
+        first, along the slide.
+    retracted : how far ahead it is at stroke 0, m.
     """
 
     kind: Literal["telescope"]
@@ -133,7 +150,11 @@ class Telescope(_Drive):
 
 
 class Revolute(_Drive):
-    """Turns the outer body of the pin `joint` by `zero` + coordinate from the inner one."""
+    """Turns the outer body of a pin by zero + coordinate from the inner one.
+
+    joint : name of the pin.
+    zero : angle of the outer body's frame from the inner one's at coordinate 0, rad.
+    """
 
     kind: Literal["revolute"]
     joint: Name
@@ -161,9 +182,12 @@ class PlanarMachine(Angled):
     element : of all beams, see multibody.elements.
     shear : whether beams shear; `included` needs the shear_coefficient of every beam.
     kinematics : `general`, or the closed form of a machine whose bodies and points bear its names.
-    ground : points of the ground by name.
-    drives : in the order of the actuator coordinates.
-    payload : the tip, where the payload hangs.
+    ground : points of the ground by name, x forward and y up, m.
+    bodies : beams and rigid bodies by name; the ground is none of these.
+    joints : what joins two bodies, by name.
+    drives : cylinders and the like by name, in the order of the actuator coordinates; one to six.
+    payload : the tip, where the payload hangs, a body.point.
+    notes : sources and assumptions that the report tells.
     instruments : what measures the machine, if a case reads it; nothing here does.
     smallest_first : the drive whose coordinate the inverse keeps as small as it can where there is
         more than one solution; not given: the solution nearest to the current one.
@@ -179,6 +203,7 @@ class PlanarMachine(Angled):
     joints: Annotated[dict[Name, Joint], Field(min_length=1)]
     drives: Annotated[dict[Name, Drive], Field(min_length=1, max_length=6)]
     payload: Reference
+    notes: tuple[str, ...] = ()
     instruments: Any = None
     smallest_first: Name | None = None
 

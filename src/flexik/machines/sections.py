@@ -71,7 +71,10 @@ def _plain_path(path: str) -> str:
 
 
 class Table(Model):
-    """A CSV of columns x_m, Iz_m4, A_m2 over the abscissa of the beam; linear between rows."""
+    """A table of the section over the abscissa of the beam, linear between rows.
+
+    file : CSV of columns x_m, Iz_m4, A_m2, found from the folder of the project.
+    """
 
     kind: Literal["table"]
     file: Annotated[str, AfterValidator(_plain_path)]
@@ -98,7 +101,10 @@ class _ClosedForm(Model):
 
 
 class Box(_ClosedForm):
-    """Hollow rectangle: outer `width`, `height` in the plane of bending, `wall`, in m."""
+    """Hollow rectangle; each dimension one number, or those of the first and last section.
+
+    width, height, wall : outer, height in the plane of bending, m.
+    """
 
     kind: Literal["box"]
     width: Taper
@@ -119,7 +125,10 @@ class Box(_ClosedForm):
 
 
 class Tube(_ClosedForm):
-    """Hollow circle: outer `diameter` and `wall`, in m."""
+    """Hollow circle; each dimension one number, or those of the first and last section.
+
+    diameter, wall : outer, m.
+    """
 
     kind: Literal["tube"]
     diameter: Taper
@@ -138,7 +147,10 @@ class Tube(_ClosedForm):
 
 
 class Solid(_ClosedForm):
-    """Full rectangle: `width`, and `height` in the plane of bending, in m."""
+    """Full rectangle; each dimension one number, or those of the first and last section.
+
+    width, height : height in the plane of bending, m.
+    """
 
     kind: Literal["solid"]
     width: Taper

@@ -10,7 +10,11 @@ from flexik.parameters.model import Model, Name, NotNegative, Positive, Restarts
 
 
 class Axis(Model):
-    """Evenly spaced values from minimum to maximum."""
+    """Evenly spaced values.
+
+    minimum, maximum : both included.
+    increment : a whole number of them lies between.
+    """
 
     minimum: float
     maximum: float
@@ -49,9 +53,11 @@ class Sizes(Axis):
 
 
 class Select(Model):
-    """Study of sizes: every size from `n_restarts` starts.
+    """Study of sizes: every size from several starts.
 
-    The smallest size within the share `tolerance` of the least selection error is chosen.
+    n_restarts : of each size.
+    tolerance : the smallest size within this share of the least selection error is chosen.
+    trainer : a name under trainers.
     """
 
     n_restarts: Restarts = 3
@@ -68,6 +74,10 @@ class Network(Model):
     n_hidden : units of the hidden layer, or of each of several; where Sizes stand, the selection
         error chooses among all of them.
     corrects : name of a network that this one is added to, so that both are one.
+    select : how the size is chosen, if it is.
+    activation : of the hidden units.
+    n_restarts : trainings from random weights, of which the least selection error is kept.
+    seed : of the weights.
     trainer : a name under trainers.
     """
 

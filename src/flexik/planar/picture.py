@@ -45,7 +45,7 @@ def picture(
     low, high = every.min(axis=0) - ROOM * size, every.max(axis=0) + ROOM * size
     height = float(np.clip((style.WIDTH - 0.7) * (high - low)[1] / (high - low)[0] + 1.4, 3.0, 9.0))
     enlarged = f", drawn {times:g} times larger" if times > 1.0 else ""
-    title = f"{shape['payload']:g} kg move the tip by {MM * sag:.4g} mm{enlarged}"
+    title = f"{moved(shape)}{enlarged}"
     return draw(
         chart,
         *([_layer(below, ".", "within all limits", **DOTS)] if len(below) else []),
@@ -61,6 +61,16 @@ def picture(
         equal=True,
         height=height,
         titles=title,
+    )
+
+
+def moved(shape: Mapping[str, Any]) -> str:
+    """How far the own weight and the payload of `shape`, see planar.shape.drawn, move the tip."""
+    rigid, own, tip = (np.array(shape[n]) for n in ("rigid_tip", "own_weight_tip", "tip"))
+    weight, payload = (MM * float(np.hypot(*way)) for way in (own - rigid, tip - own))
+    return (
+        f"own weight moves the tip by {weight:.4g} mm, {shape['payload']:g} kg by {payload:.4g} mm"
+        " more"
     )
 
 

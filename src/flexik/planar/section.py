@@ -34,7 +34,12 @@ LESS, MORE = 0.002, 2.0
 
 
 class Selection(Model):
-    """Random set that chooses among restarts."""
+    """Random set that chooses among restarts.
+
+    n_samples : drawn.
+    payload : least and largest, kg.
+    seed : of the drawing.
+    """
 
     n_samples: Count
     payload: tuple[NotNegative, NotNegative]
@@ -44,8 +49,10 @@ class Selection(Model):
 class Samples(Model):
     """Poses to learn from and to select by; left out are those with the tip behind a limit.
 
-    grid : values of every drive, m or rad, and of the payload, kg.
-    minimum_tip_x : m; None: there is no limit.
+    grid : values of every drive, m or rad, and of the `payload`, kg.
+    selection : random set that chooses among restarts.
+    minimum_tip_x : m; samples with the tip behind it are left out; not given: there is no limit.
+    maximum_failed_share : of samples without equilibrium; more fails the stage.
     """
 
     grid: dict[Name, Axis]
@@ -57,8 +64,12 @@ class Samples(Model):
 class OwnSamples(Model):
     """Samples of a file in place of a model's, see planar.own_samples.
 
+    file : CSV or Parquet, found from the folder of the project; a column for the coordinate of
+        each drive (DRIVE_stroke or DRIVE_angle), payload, tip_x and tip_y, with a unit in its
+        header, `boom_stroke (mm)`.
     columns : headers of the file, by the name of the column that they stand for.
-    selection_share, held_out_share : of the rows, drawn by `seed`; the others are learnt from.
+    selection_share, held_out_share : of the poses, drawn at random; the others are learnt from.
+    seed : of the division.
     """
 
     file: str
@@ -86,7 +97,11 @@ AnySamples = Annotated[
 
 
 class PlanarNetwork(Network):
-    """A network of a planar machine."""
+    """A network of a planar machine.
+
+    learns : deflection (flexible minus rigid tip), tip, rigid_tip, or coordinates (from tip and
+        payload; machines of two drives); given unless it corrects another.
+    """
 
     learns: Literal["deflection", "tip", "rigid_tip", "coordinates"] | None = None
 

@@ -15,24 +15,37 @@ from flexik.positioning.registry import Methods
 
 
 class Picture(Model):
-    """Sample drawn in the picture: coordinates in m or rad, payload in kg."""
+    """Sample drawn in the picture.
+
+    values : coordinates in the order of the drives, m or rad.
+    payload : kg.
+    """
 
     values: list[float]
     payload: NotNegative
 
 
 class Studies(Model):
-    """picture: None: all drives in the middle of their limits, the largest payload of the grid."""
+    """What is looked at beside the errors.
+
+    picture : sample that is drawn; not given: all drives in the middle of their limits, the largest
+        payload of the grid.
+    """
 
     picture: Picture | None = None
 
 
 class Section(PlanarSection):
-    """A machine whose constants are all known.
+    """A machine of a file whose constants are all known.
 
+    calibration : null, as nothing is fitted.
     samples : equilibria of the model, or a file of samples of one's own.
-    conditions, methods : left out where samples are of a file, which comes with no model to judge
-        methods by.
+    networks : what learns, by name; at least one.
+    conditions : sets of targets and payloads by name; none where samples are of a file, which comes
+        with no model to judge methods by.
+    methods : what is compared, by name, `none` among them; one that is called like a
+        method is this method; left out where samples are of a file.
+    studies : what is looked at beside the errors.
     """
 
     samples: AnySamples  # type: ignore[assignment]
