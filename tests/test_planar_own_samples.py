@@ -168,6 +168,9 @@ def test_a_case_runs_on_samples_of_its_own(section, tmp_path):
     page = (tmp_path / "reports/excavator/README.md").read_text()
     assert "On 24 samples that no network saw, `deflection` is" in page
     assert "rigid kinematics alone are" in page
+    assert "were held out together" in page
+    assert "`none`" not in page  # no method is judged
+    assert "Assumed, after pictures" in page  # notes of the machine file
 
 
 @pytest.mark.parametrize(
