@@ -119,12 +119,12 @@ def _names(
     cylinders = {n: drive.of for n, drive in machine.drives.items() if isinstance(drive, Cylinder)}
     ends = {n: [_placed(machine, poses, end) for end in of] for n, of in cylinders.items()}
     kinds = (
-        ({n: p.mean(axis=0) for n, p in along.items()}, style.BLUE, (-6.0, -6.0, "right")),
+        ({n: p.mean(axis=0) for n, p in along.items()}, style.BLUE, (-6.0, -8.0, "right")),
         ({n: np.mean(p, axis=0) for n, p in ends.items()}, style.VERMILION, (0.0, 9.0, "center")),
         (
             {n: _placed(machine, poses, joint.of[0]) for n, joint in machine.joints.items()},
             style.INK,
-            (7.0, -3.0, "left"),
+            (5.0, 8.0, "left"),
         ),
     )
     near = NEAR * float(np.ptp(np.concatenate([*points.values()]), axis=0).max())
