@@ -102,6 +102,7 @@ def run(name: str) -> int:
     cases.check(section)
     # quiet: DVC warns of every empty folder, as of constants where none is fitted
     command = [sys.executable, "-m", "dvc", "repro", f"report@{name}"]
+    print(f"dvc repro report@{name}: computes what changed", flush=True)
     status = subprocess.run([*command, "--quiet"]).returncode
     if status:
         print(f"not done; `dvc repro report@{name}` tells more", file=sys.stderr)
