@@ -28,6 +28,7 @@ from flexik.planar.fields import (
     kept,
     sample_fields,
 )
+from flexik.planar.fields import inputs as inputs_of
 
 Array = NDArray[np.float64]
 
@@ -37,6 +38,10 @@ _SAME = 1e-6
 DEFLECTION = (
     Field("deflection_x", "m", "flexible minus rigid tip"),
     Field("deflection_y", "m", "flexible minus rigid tip"),
+)
+REMAINDER = (
+    Field("remainder_x", "m", "flexible tip minus that of beam theory"),
+    Field("remainder_y", "m", "flexible tip minus that of beam theory"),
 )
 CORRECTION = (
     Field("correction_x", "m", "flexible tip minus the rigid network's"),
@@ -65,6 +70,7 @@ def kind_of(machine: PlanarMachine, name: str) -> Kind:
     loaded = (*given, PAYLOAD)
     return {
         "deflection": Kind(loaded, DEFLECTION),
+        "remainder": Kind(loaded, REMAINDER),
         "tip": Kind(loaded, TIP),
         "rigid_tip": Kind(given, RIGID, once_a_pose=True),
         "correction": Kind(loaded, CORRECTION),
@@ -88,15 +94,15 @@ def lesson(
     machine: PlanarMachine,
     grid: Path,
     selection: Path,
-    rigid: Predictor | None = None,
+    base: Predictor | None = None,
 ) -> Lesson:
     """What a network of `kind` learns from the table `grid`, chosen by `selection`.
 
-    `rigid` is the trained rigid network that a correction corrects, its errors included
-    (Rouvinen 1999, chapter 4.3); only kind `correction` needs it.
+    `base` is what others add to: of kind `correction` the trained rigid network, its errors
+    included (Rouvinen 1999, chapter 4.3), of kind `remainder` beam theory.
     """
     tables = [kept(read_table(path, sample_fields(machine))) for path in (grid, selection)]
-    (inputs, outputs), chosen_by = (_pair(table, kind, machine, rigid) for table in tables)
+    (inputs, outputs), chosen_by = (_pair(table, kind, machine, base) for table in tables)
     judge = None
     if kind == "coordinates":
         reach = np.ptp(tables[0][_names(TIP)].to_numpy(), axis=0) / 2.0
@@ -164,12 +170,14 @@ def learnt_rows(table: pd.DataFrame, kind: str, machine: PlanarMachine) -> pd.Da
 
 
 def _pair(
-    table: pd.DataFrame, kind: str, machine: PlanarMachine, rigid: Predictor | None
+    table: pd.DataFrame, kind: str, machine: PlanarMachine, base: Predictor | None
 ) -> tuple[Array, Array]:
     table = learnt_rows(table, kind, machine)
     found = {DEFLECTION: deflection(table)}
-    if rigid is not None:
-        found[CORRECTION] = correction(table, machine, rigid)
+    if base is not None and kind == "remainder":
+        found[REMAINDER] = deflection(table) - base.predict(table[inputs_of(machine)].to_numpy())
+    elif base is not None:
+        found[CORRECTION] = correction(table, machine, base)
     for pair, values in found.items():
         table = table.assign(**dict(zip(_names(pair), values.T, strict=True)))
     columns = kind_of(machine, kind)
