@@ -84,7 +84,11 @@ AnySamples = Annotated[
 class PlanarNetwork(Network):
     """A network of a planar machine; n_passes : of the beam theory whose remainder it learns."""
 
-    learns: Literal["deflection", "tip", "rigid_tip", "coordinates", "remainder"] | None = None
+    learns: (
+        Literal["deflection", "tip", "rigid_tip", "coordinates", "remainder"]
+        | Literal["target_shift", "stroke_shift", "payload_linear", "payload_quadratic"]
+        | None
+    ) = None
     n_passes: Passes = 2
 
 
