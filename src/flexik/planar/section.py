@@ -92,6 +92,15 @@ class PlanarNetwork(Network):
     n_passes: Passes = 2
 
 
+class CorrectionStudy(Model):
+    """Numbers of corrections of `methods`, on the first targets of random `conditions`."""
+
+    methods: Annotated[list[Name], Field(min_length=1)]
+    n_corrections: Annotated[list[Count], Field(min_length=1)] = [1, 2, 3, 5, 20]  # noqa: RUF012
+    conditions: Name = "workspace"
+    n_targets: Count = 500
+
+
 class PlanarSection(CaseSection):
     """A planar flexible machine."""
 
