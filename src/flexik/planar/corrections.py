@@ -17,8 +17,9 @@ from flexik.kinematics.machine_file import manipulator_of
 from flexik.machines.planar import PlanarMachine
 from flexik.multibody.planar import tips
 from flexik.planar.conditions import at
+from flexik.planar.constants import model_inputs
 from flexik.planar.fields import QUERY, target_fields
-from flexik.planar.machine import columns_of, flexible, model_inputs
+from flexik.planar.machine import columns_of, flexible
 from flexik.planar.methods import method_inputs, method_settings, trained_method
 from flexik.planar.section import CorrectionStudy, PlanarSection
 from flexik.positioning.method import Columns, Method

@@ -16,9 +16,9 @@ from flexik.learning.storage import load_network
 from flexik.learning.training import Architecture
 from flexik.machines.planar import PlanarMachine
 from flexik.parameters.trainers import Stopping
+from flexik.planar.constants import known, model_inputs
 from flexik.planar.fields import TIP
 from flexik.planar.learning import lesson
-from flexik.planar.machine import known, model_inputs
 from flexik.planar.section import PlanarSection
 
 Theory = Callable[[PlanarMachine, int], Predictor]

@@ -9,7 +9,7 @@ from flexik.kinematics.crane import CraneGeometry
 from flexik.kinematics.machine_file import crane_geometry, with_geometry
 from flexik.machines.planar import Fixed, PlanarMachine
 from flexik.multibody.flexible import FlexibleMachine
-from flexik.planar.machine import known
+from flexik.planar.constants import known
 
 
 class FlexibleCrane(FlexibleMachine):
