@@ -10,6 +10,8 @@ from flexik.kinematics.manipulator import Array
 from flexik.machines.bodies import Point
 from flexik.machines.planar import PlanarMachine
 
+Ends = Point | tuple[Array, Array]
+
 
 @dataclass(frozen=True)
 class Equation:
@@ -19,14 +21,16 @@ class Equation:
     kind : `point` (the points are one, two equations), `angle` (between the bodies), `distance` (of
         the points) or `line` (distance of the points along `direction` of the first body).
     constant, drive : what angle or distance is, in rad or m; plus a coordinate if there is a drive.
+
+    Points, constant and direction may be numbers of every row, (n,).
     """
 
     key: str
     kind: str
     bodies: tuple[int, int]
-    points: tuple[Point, Point]
-    constant: float = 0.0
-    direction: float = 0.0
+    points: tuple[Ends, Ends]
+    constant: Array | float = 0.0
+    direction: Array | float = 0.0
     drive: int | None = None
 
     @property
@@ -166,7 +170,7 @@ def _next_block(held: set[int], waiting: list[int], equations: list[Equation]) -
     return Block(tuple(waiting), tuple(own))
 
 
-def _turned(angle: Array, point: Point) -> Array:
+def _turned(angle: Array, point: Ends) -> Array:
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * point[0] - s * point[1], s * point[0] + c * point[1]], axis=-1)
 

@@ -15,6 +15,8 @@ from flexik.parameters.conditions import ConditionSet, Points
 from flexik.parameters.model import Count, Model, Name, NotNegative, Seed, Share
 from flexik.parameters.networks import Axis, Network, check_networks
 from flexik.parameters.section import CaseSection
+from flexik.positioning.beam_model import Passes, theory
+from flexik.positioning.beam_network import Settings as BeamNetwork
 from flexik.positioning.registry import Methods, check_methods
 
 Part = Annotated[float, Field(gt=0, lt=1)]
@@ -96,14 +98,41 @@ AnySamples = Annotated[
 ]
 
 
+Learns = Literal[
+    "deflection",
+    "remainder",
+    "tip",
+    "rigid_tip",
+    "coordinates",
+    "target_shift",
+    "stroke_shift",
+    "payload_linear",
+    "payload_quadratic",
+]
+
+
 class PlanarNetwork(Network):
     """A network of a planar machine.
 
-    learns : deflection (flexible minus rigid tip), tip, rigid_tip, or coordinates (from tip and
-        payload; machines of two drives); given unless it corrects another.
+    learns : deflection (flexible minus rigid tip); remainder (what beam theory leaves of it); tip;
+        rigid_tip; coordinates (from tip and payload; machines of two drives); target_shift or
+        stroke_shift (what the rigid inverse of the target lacks); payload_linear or
+        payload_quadratic (deflection as a polynomial of the payload); given unless it corrects
+        another.
+    n_passes : over the deformed pose, of the beam theory whose remainder it learns.
     """
 
-    learns: Literal["deflection", "tip", "rigid_tip", "coordinates"] | None = None
+    learns: Learns | None = None
+    n_passes: Passes = 2
+
+
+class CorrectionStudy(Model):
+    """Numbers of corrections of `methods`, on the first targets of random `conditions`."""
+
+    methods: Annotated[list[Name], Field(min_length=1)]
+    n_corrections: Annotated[list[Count], Field(min_length=1)] = [1, 2, 3, 5, 20]  # noqa: RUF012
+    conditions: Name = "workspace"
+    n_targets: Count = 500
 
 
 class PlanarSection(CaseSection):
@@ -131,6 +160,14 @@ class PlanarSection(CaseSection):
         own = [self.samples.file] if isinstance(self.samples, OwnSamples) else []
         return [Path(file) for file in (*self.machine.section_files.values(), *own)]
 
+    def base_of(self, name: str) -> dict[str, Any]:
+        """Settings of the beam theory whose remainder network `name` learns, if it does."""
+        network = self.networks[name]
+        if network.learns != "remainder":
+            return {}
+        # told here, where code is not counted: that of a theory concerns no other network
+        return {"theory": theory, "n_passes": network.n_passes}
+
     @model_validator(mode="after")
     def _fits_its_machine(self) -> Self:
         self._check_grid()
@@ -141,6 +178,14 @@ class PlanarSection(CaseSection):
             if len(network.layers) != 1:
                 raise ValueError(f"networks.{name}.n_hidden: expected one layer")
         check_methods(self.methods, self.networks)
+        for name, method in self.methods.items():
+            if isinstance(method, BeamNetwork):
+                learnt = self.networks[method.network or ""].n_passes
+                if method.n_passes != learnt:
+                    raise ValueError(
+                        f"methods.{name}.n_passes: {method.network!r} learns what {learnt} leave, "
+                        f"got {method.n_passes}"
+                    )
         if "none" not in self.methods and isinstance(self.samples, Samples):
             raise ValueError("methods.none: expected, the others are compared with it")
         if taken := self.conditions.keys() & type(self.samples).model_fields.keys():

@@ -11,7 +11,8 @@ from flexik.machines.planar import PlanarMachine
 from flexik.machines.sections import Array
 from flexik.multibody.flexible import FlexibleMachine
 from flexik.multibody.planar import shapes, tips
-from flexik.planar.machine import flexible, model_inputs
+from flexik.planar.constants import model_inputs
+from flexik.planar.machine import flexible
 from flexik.planar.section import PlanarSection
 
 
