@@ -102,7 +102,7 @@ def lesson(
     included (Rouvinen 1999, chapter 4.3), of kind `remainder` beam theory.
     """
     tables = [kept(read_table(path, sample_fields(machine))) for path in (grid, selection)]
-    (inputs, outputs), chosen_by = (_pair(table, kind, machine, base) for table in tables)
+    (inputs, outputs), chosen_by = (pair(table, kind, machine, base) for table in tables)
     judge = None
     if kind == "coordinates":
         reach = np.ptp(tables[0][_names(TIP)].to_numpy(), axis=0) / 2.0
@@ -169,9 +169,10 @@ def learnt_rows(table: pd.DataFrame, kind: str, machine: PlanarMachine) -> pd.Da
     return table[on_branch(table, machine)] if columns.one_branch else table
 
 
-def _pair(
-    table: pd.DataFrame, kind: str, machine: PlanarMachine, base: Predictor | None
+def pair(
+    table: pd.DataFrame, kind: str, machine: PlanarMachine, base: Predictor | None = None
 ) -> tuple[Array, Array]:
+    """Inputs (n, p) and outputs (n, q) of a network of `kind`; `base` as for `lesson`."""
     table = learnt_rows(table, kind, machine)
     found = {DEFLECTION: deflection(table)}
     if base is not None and kind == "remainder":

@@ -1,22 +1,26 @@
 """The section of a planar flexible machine in params.yaml."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from flexik.errors import ParameterError
+from flexik.errors import ParameterError, TrainingError
 from flexik.kinematics.machine_file import check_machine, manipulator_of
 from flexik.kinematics.manipulator import Manipulator
+from flexik.learning.regressor import estimator, load_regressor
+from flexik.learning.storage import load_networks
+from flexik.learning.torch_module import code_of, load_modules
 from flexik.machines.planar import PlanarMachine
 from flexik.parameters.conditions import ConditionSet, Points
 from flexik.parameters.model import Count, Model, Name, NotNegative, Seed, Share
-from flexik.parameters.networks import Axis, Network, check_networks
+from flexik.parameters.networks import Axis, Network, Regressor, TorchModule, check_networks
 from flexik.parameters.section import CaseSection
 from flexik.positioning.beam_model import Passes, theory
 from flexik.positioning.beam_network import Settings as BeamNetwork
+from flexik.positioning.inverted_network import InvertedSettings
 from flexik.positioning.registry import Methods, check_methods
 
 Part = Annotated[float, Field(gt=0, lt=1)]
@@ -81,11 +85,41 @@ AnySamples = Annotated[
 ]
 
 
+Learnt = Literal["deflection", "tip", "rigid_tip", "coordinates", "remainder"]
+
+
 class PlanarNetwork(Network):
     """A network of a planar machine; n_passes : of the beam theory whose remainder it learns."""
 
-    learns: Literal["deflection", "tip", "rigid_tip", "coordinates", "remainder"] | None = None
+    learns: Learnt | None = None
     n_passes: Passes = 2
+
+
+class PlanarRegressor(Regressor):
+    """A regressor in place of a network."""
+
+    learns: Learnt
+    n_passes: Passes = 2
+
+
+class PlanarModule(TorchModule):
+    """A module of torch in place of a network."""
+
+    learns: Learnt
+    n_passes: Passes = 2
+
+
+def _learner(given: Any) -> str:
+    keys = given if isinstance(given, dict) else getattr(type(given), "model_fields", ())
+    return next((f"a_{kind}" for kind in ("regressor", "module") if kind in keys), "a_network")
+
+
+AnyNetwork = Annotated[
+    Annotated[PlanarNetwork, Tag("a_network")]
+    | Annotated[PlanarRegressor, Tag("a_regressor")]
+    | Annotated[PlanarModule, Tag("a_module")],
+    Discriminator(_learner),
+]
 
 
 class PlanarSection(CaseSection):
@@ -93,7 +127,7 @@ class PlanarSection(CaseSection):
 
     machine: PlanarMachine
     samples: Samples
-    networks: Annotated[dict[Name, PlanarNetwork], Field(min_length=1)]
+    networks: Annotated[dict[Name, AnyNetwork], Field(min_length=1)]
     conditions: dict[Name, ConditionSet]
     methods: Methods
 
@@ -113,6 +147,22 @@ class PlanarSection(CaseSection):
         own = [self.samples.file] if isinstance(self.samples, OwnSamples) else []
         return [Path(file) for file in (*self.machine.section_files.values(), *own)]
 
+    def file_of(self, name: str) -> Path:
+        """File of the trained network `name`."""
+        extension = "skops" if isinstance(self.networks[name], Regressor) else "json"
+        return self.data / f"networks/{name}.{extension}"
+
+    def has_restarts(self, name: str) -> bool:
+        """Whether network `name` comes from several starts, of which a file keeps all."""
+        return not isinstance(self.networks[name], Regressor)
+
+    def load_of(self, name: str) -> Callable[[Path], Any]:
+        """The function that reads such files: networks and their records."""
+        network = self.networks[name]
+        if isinstance(network, TorchModule):
+            return load_modules
+        return load_regressor if isinstance(network, Regressor) else load_networks
+
     def base_of(self, name: str) -> dict[str, Any]:
         """Settings of the beam theory whose remainder network `name` learns, if it does."""
         network = self.networks[name]
@@ -128,10 +178,13 @@ class PlanarSection(CaseSection):
         for name, network in self.networks.items():
             if network.corrects and self.networks[network.corrects].learns != "rigid_tip":
                 raise ValueError(f"networks.{name}.corrects: expected a network of the rigid_tip")
-            if len(network.layers) != 1:
+            if isinstance(network, PlanarNetwork) and len(network.layers) != 1:
                 raise ValueError(f"networks.{name}.n_hidden: expected one layer")
         check_methods(self.methods, self.networks)
         for name, method in self.methods.items():
+            asked = self.networks.get(method.network or "")
+            if isinstance(method, InvertedSettings) and not isinstance(asked, PlanarNetwork):
+                raise ValueError(f"methods.{name}.network: expected one of n_hidden units")
             if isinstance(method, BeamNetwork):
                 learnt = self.networks[method.network or ""].n_passes
                 if method.n_passes != learnt:
@@ -173,6 +226,7 @@ def check(section: PlanarSection, others: Mapping[str, Any] | None = None) -> No
         check_machine(section.machine)
     except ValueError as error:
         raise ParameterError(f"{section.machine_file}: {error}") from None
+    _check_learners(section)
     sets = {f"conditions.{name}": given for name, given in section.conditions.items()}
     for key, given in (sets | dict(others or {})).items():
         if isinstance(given, Points):
@@ -189,6 +243,17 @@ def check(section: PlanarSection, others: Mapping[str, Any] | None = None) -> No
             raise ParameterError(
                 f"params.yaml: {section.name}.{key}: the machine reaches nothing in x, y"
             )
+
+
+def _check_learners(section: PlanarSection) -> None:
+    for name, network in section.networks.items():
+        try:
+            if isinstance(network, Regressor):
+                estimator(network.regressor)
+            elif isinstance(network, TorchModule):
+                code_of(network.module)
+        except TrainingError as error:
+            raise ParameterError(f"params.yaml: {section.name}.networks.{name}: {error}") from None
 
 
 def _reached(section: PlanarSection, points: np.ndarray) -> np.ndarray:

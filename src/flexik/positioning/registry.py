@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Union
 from pydantic import BeforeValidator, Field
 
 from flexik.parameters.model import Name
-from flexik.parameters.networks import Network
+from flexik.parameters.networks import Learner, Network
 from flexik.positioning.method import Ingredients, Method, Settings
 
 Build = Callable[[Any, Ingredients], Method]
@@ -60,7 +60,9 @@ def build_of(settings: Settings) -> Build:
     return METHODS[settings.method][1]
 
 
-def check_methods(methods: Mapping[str, Settings], networks: Mapping[str, Network]) -> None:
+def check_methods(
+    methods: Mapping[str, Settings], networks: Mapping[str, Network | Learner]
+) -> None:
     """Raise ValueError unless each of `methods` names a network that learnt what it needs."""
     for name, method in methods.items():
         if method.needs is None:

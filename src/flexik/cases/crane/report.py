@@ -81,7 +81,8 @@ def values(results: Results) -> dict[str, Any]:
         "section": section,
         "methods": methods,
         "of_published_size": all(
-            section.networks[name].n_hidden == results.published_size(name) for name in used
+            getattr(section.networks[name], "n_hidden", None) == results.published_size(name)
+            for name in used
         ),
         "reached": REACHED,
         "meaning": STATUS_MEANING,

@@ -290,7 +290,7 @@ def _sizes(results: Results) -> dict[str, Drawing]:
     chosen = {name: size for name, (_, size) in results.studies.items()}
     found = {}
     for name, sizes in frames.items():
-        tolerance = 100 * results.section.networks[name].select.tolerance
+        tolerance = 100 * results.section.networks[name].select.tolerance  # type: ignore[union-attr]
         rule = f"smallest size within {tolerance:g} %" if tolerance else "size"
         rule = f"Choice: {rule} of the least selection error"
         options = {"chosen": chosen[name], "published": published[name], "titles": rule}

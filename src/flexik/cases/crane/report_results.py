@@ -21,7 +21,6 @@ from flexik.evaluation.operations import (
 from flexik.files import read_json
 from flexik.learning.perceptron import Network
 from flexik.learning.size_selection import by_size, read_layers
-from flexik.learning.storage import load_network
 from flexik.planar.fields import kept
 from flexik.planar.learning import correction
 from flexik.positioning.inverted_network import InvertedSettings
@@ -70,7 +69,7 @@ class Results:
     mesh: pd.DataFrame
     training: pd.DataFrame
     studies: Mapping[str, tuple[pd.DataFrame, int]]
-    trained: Mapping[str, Network]
+    trained: Mapping[str, Any]
     tolerances: pd.DataFrame
     fitting: pd.DataFrame
     query_times: pd.DataFrame
@@ -146,6 +145,8 @@ class Results:
         if method.network is None:
             return None
         network = self.trained[method.network]
+        if not isinstance(network, Network):
+            return None
         if not isinstance(method, InvertedSettings):
             return getattr(method, "n_corrections", 1) * forward_operations(network)
         step = STEPS[method.inversion.kind](network, len(network.inputs) - 1)
@@ -201,7 +202,7 @@ def read(section: Section) -> Results:
             for name, network in networks.items()
             if network.is_selected
         },
-        trained={name: load_network(data / f"networks/{name}.json")[0] for name in networks},
+        trained={name: section.load_of(name)(section.file_of(name))[0][0] for name in networks},
         tolerances=read_table(data / "studies/tolerance.parquet"),
         fitting=read_table(data / "studies/fitting.parquet"),
         query_times=times[times["settings"] == keys],

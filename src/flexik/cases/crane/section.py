@@ -13,7 +13,7 @@ from flexik.kinematics.machine_file import crane_geometry
 from flexik.parameters.conditions import Points, RandomTargets, check_different
 from flexik.parameters.model import Count, Model, Name, NotNegative, Positive, Seed
 from flexik.planar import section as planar
-from flexik.planar.section import SAME, PlanarSection
+from flexik.planar.section import SAME, PlanarNetwork, PlanarSection
 from flexik.positioning.combined import Settings as Combined
 from flexik.positioning.inverted_network import InvertedSettings
 
@@ -172,11 +172,15 @@ class Section(PlanarSection):
         }
         for key, (name, kind) in needed.items():
             known = [other for other, given in self.methods.items() if isinstance(given, kind)]
+            known = [n for n in known if isinstance(self._network_of(n), PlanarNetwork)]
             if name not in known:
                 raise ValueError(
                     f"studies.{key}: {name!r} is none of the methods that serve, "
                     f"{', '.join(known) or 'of which there is none'}"
                 )
+
+    def _network_of(self, method: str) -> object:
+        return self.networks.get(self.methods[method].network or "")
 
 
 def check(section: Section) -> None:

@@ -13,7 +13,6 @@ from flexik.datasets.tables import read_table
 from flexik.evaluation.errors import workspace_statistics
 from flexik.files import read_json
 from flexik.kinematics.status import REACHED
-from flexik.learning.storage import load_network
 from flexik.machines.bodies import Beam
 from flexik.parameters.conditions import RandomTargets
 from flexik.planar import held_out
@@ -70,7 +69,7 @@ class Results:
                 {
                     "network": name,
                     "learns": network.learns or f"what {network.corrects} lacks",
-                    "hidden": len(load_network(folder / f"{name}.json")[0].weights[0]),
+                    "hidden": restarts["n_hidden"].iloc[0],
                     "restarts": len(restarts),
                     "trainer": network.trainer,
                     "least": found.min(),
