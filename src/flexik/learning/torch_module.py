@@ -85,6 +85,9 @@ class Module:
         return self.output_normalisation.from_unit(unit.numpy())
 
 
+Trained = tuple[Module, TrainingRecord]
+
+
 def made(given: Mapping[str, Any], n_inputs: int, n_outputs: int) -> "nn.Module":
     """The module `given` with its first weights; raises TrainingError if there is none like it."""
     from torch import nn
@@ -133,6 +136,28 @@ def train(
             run.take(minima[-1].weights[0])
         found = run.module() if minima[-1].errors else None
     return found, _record(trainers, minima, seed, restart, examples, found)
+
+
+def train_best(
+    given: Mapping[str, Any],
+    examples: Examples,
+    trainers: Sequence[Adam | Lbfgs],
+    seed: int,
+    n_restarts: int,
+    device: str = "cpu",
+) -> Module:
+    """The best of `n_restarts` starts by selection error; raises TrainingError if all fail."""
+    runs = [train(given, examples, trainers, seed, k, device) for k in range(n_restarts)]
+    return best(runs)[0]
+
+
+def best(runs: Sequence[tuple[Module | None, TrainingRecord]]) -> Trained:
+    """The one of the least selection error; raises TrainingError if there is none."""
+    usable = [(found, record) for found, record in runs if found is not None]
+    if not usable:
+        reasons = ", ".join(str(record.stop_reason) for _, record in runs)
+        raise TrainingError(f"module: no usable one, restarts ended with {reasons}")
+    return min(usable, key=lambda run: run[1].rank)
 
 
 def _record(
@@ -330,9 +355,6 @@ class _File(_Section):
 class _Attempt(_Section):
     module: _Module | None
     record: TrainingRecord
-
-
-Trained = tuple[Module, TrainingRecord]
 
 
 def module_file(modules: Sequence[Trained]) -> Callable[[Path], None]:

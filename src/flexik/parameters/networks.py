@@ -102,6 +102,7 @@ class Learner(Model):
 class Regressor(Learner):
     """A regressor of scikit-learn; regressor: name and options, see learning.regressor."""
 
+    n_restarts: ClassVar[int] = 1
     regressor: dict[str, Any]
 
     @property

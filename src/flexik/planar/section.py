@@ -29,6 +29,8 @@ Part = Annotated[float, Field(gt=0, lt=1)]
 SAME = 1e-9
 # Places a side of the raster on which an area must have one that is reached
 RASTER = 40
+# What networks of learning curves may learn
+CURVES = ("deflection", "remainder")
 # Most samples of a grid
 MOST_SAMPLES = 10_000_000
 
@@ -120,6 +122,25 @@ AnyNetwork = Annotated[
     | Annotated[PlanarModule, Tag("a_module")],
     Discriminator(_learner),
 ]
+
+
+class LearningCurves(Model):
+    """Networks from fewer and from more samples.
+
+    networks : names of networks of deflection or remainder whose size is given.
+    n_samples : random ones, between the least and the largest payload of the grid.
+    n_levels : payloads of the grid that are kept, as evenly spaced as it has them.
+    n_restarts : of each; at most those of the network itself.
+    n_judged : random samples that judge; again with each payload `outside`, kg.
+    """
+
+    networks: Annotated[tuple[Name, ...], Field(min_length=1)]
+    n_samples: tuple[Count, ...] = (250, 1000, 4000)
+    n_levels: tuple[Annotated[int, Field(ge=2)], ...] = (2, 3, 5, 10)
+    n_restarts: Count = 2
+    n_judged: Count = 2000
+    outside: tuple[NotNegative, ...] = ()
+    seed: Seed = 1
 
 
 class PlanarSection(CaseSection):
@@ -215,6 +236,19 @@ class PlanarSection(CaseSection):
                 raise ValueError(f"samples.grid.{name}: expected values from {low:g} to {high:g}")
         if n_samples > MOST_SAMPLES:
             raise ValueError(f"samples.grid: {n_samples:.3g} samples, at most {MOST_SAMPLES:.0g}")
+
+
+def check_curves(section: PlanarSection, study: LearningCurves | None) -> None:
+    """Raise ValueError unless the networks of `study` are there and can be judged by the tip."""
+    if study and not isinstance(section.samples, Samples):
+        raise ValueError("studies.learning_curves: expected none, samples of a file have no model")
+    for number, name in enumerate(study.networks if study else ()):
+        network = section.networks.get(name)
+        if network is None or network.is_selected or network.learns not in CURVES:
+            raise ValueError(
+                f"studies.learning_curves.networks.{number}: expected a network of given size that "
+                f"learns {' or '.join(CURVES)}, got {name!r}"
+            )
 
 
 def check(section: PlanarSection, others: Mapping[str, Any] | None = None) -> None:

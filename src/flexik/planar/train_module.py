@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from flexik.datasets.parts import Columns, Part, Work, Writer, text_file
-from flexik.errors import TrainingError
 from flexik.learning.examples import Examples
 from flexik.learning.fit import restarts_csv
-from flexik.learning.torch_module import code_of, module_file, packed, train, unpacked
+from flexik.learning.torch_module import best, code_of, module_file, packed, train, unpacked
 from flexik.machines.planar import PlanarMachine
 from flexik.parameters.networks import TorchModule
 from flexik.parameters.trainers import Adam, Lbfgs
@@ -53,11 +52,8 @@ def prepare(
     def finish(results: list[Columns]) -> Mapping[str, Writer]:
         runs = [unpacked(result) for result in results]
         usable = [(found, record) for found, record in runs if found is not None]
-        if not usable:
-            reasons = ", ".join(record.stop_reason for _, record in runs)
-            raise TrainingError(f"module {code.name}: no usable one, restarts ended with {reasons}")
         return {
-            ".json": module_file([min(usable, key=lambda run: run[1].rank)]),
+            ".json": module_file([best(runs)]),
             ".restarts.json": module_file(usable),
             ".restarts.csv": text_file(restarts_csv([record for _, record in runs], layers)),
         }

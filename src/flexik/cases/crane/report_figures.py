@@ -11,7 +11,7 @@ from flexik.cases.crane.report_results import Results
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.status import REACHED
 from flexik.planar.fields import deflection
-from flexik.reporting import kinds, plane, style
+from flexik.reporting import curves, kinds, plane, style
 from flexik.reporting.chart import Axis, Layer, chart
 from flexik.reporting.report import Drawing, draw
 from flexik.reporting.style import MM
@@ -35,6 +35,7 @@ def figures(results: Results) -> dict[str, Drawing]:
         **_sizes(results),
         "training_race": _race(results.training_curves),
         "under_and_overfitting": _fitting(results),
+        **({"learning_curves": curves.figure(results.curves)} if len(results.curves) else {}),
     }
 
 

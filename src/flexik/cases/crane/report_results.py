@@ -21,6 +21,7 @@ from flexik.evaluation.operations import (
 from flexik.files import read_json
 from flexik.learning.perceptron import Network
 from flexik.learning.size_selection import by_size, read_layers
+from flexik.planar import learning_curves
 from flexik.planar.fields import kept
 from flexik.planar.learning import correction
 from flexik.positioning.inverted_network import InvertedSettings
@@ -56,6 +57,7 @@ class Results:
     training : a row for every restart of every network.
     studies : frame of learning.size_selection.by_size, and the chosen size, by network.
     query_times, training_curves : measured by benchmarks.
+    curves : of planar.learning_curves.
     """
 
     section: Section
@@ -75,6 +77,7 @@ class Results:
     query_times: pd.DataFrame
     training_curves: pd.DataFrame
     shape: Mapping[str, Any]
+    curves: pd.DataFrame
 
     @property
     def methods(self) -> dict[str, Settings]:
@@ -211,6 +214,7 @@ def read(section: Section) -> Results:
         ),
         shape=read_json(data / "studies/shape.json")
         | {"exaggeration": section.studies.shape.exaggeration},
+        curves=learning_curves.read(section, section.studies.learning_curves),
     )
 
 

@@ -13,7 +13,13 @@ from flexik.kinematics.machine_file import crane_geometry
 from flexik.parameters.conditions import Points, RandomTargets, check_different
 from flexik.parameters.model import Count, Model, Name, NotNegative, Positive, Seed
 from flexik.planar import section as planar
-from flexik.planar.section import SAME, PlanarNetwork, PlanarSection
+from flexik.planar.section import (
+    SAME,
+    LearningCurves,
+    PlanarNetwork,
+    PlanarSection,
+    check_curves,
+)
 from flexik.positioning.combined import Settings as Combined
 from flexik.positioning.inverted_network import InvertedSettings
 
@@ -103,6 +109,7 @@ class Studies(Model):
     shape: Shape
     fitting: Fitting
     tolerance: ToleranceStudy
+    learning_curves: LearningCurves | None = None
     measured: Measured
 
 
@@ -135,6 +142,7 @@ class Section(PlanarSection):
         self._check_shape()
         self._check_fitting()
         self._check_methods()
+        check_curves(self, self.studies.learning_curves)
         for name, kind in (("published", Points), ("workspace", RandomTargets)):
             if not isinstance(self.conditions.get(name), kind):
                 raise ValueError(f"conditions.{name}: expected {kind.__name__}, which is reported")

@@ -5,7 +5,14 @@ from typing import Self
 from pydantic import model_validator
 
 from flexik.parameters.model import Model, NotNegative
-from flexik.planar.section import AnySamples, OwnSamples, PlanarSection, check
+from flexik.planar.section import (
+    AnySamples,
+    LearningCurves,
+    OwnSamples,
+    PlanarSection,
+    check,
+    check_curves,
+)
 
 __all__ = ["Section", "check"]
 
@@ -21,6 +28,7 @@ class Studies(Model):
     """picture: None: all drives in the middle of their limits, the largest payload of the grid."""
 
     picture: Picture | None = None
+    learning_curves: LearningCurves | None = None
 
 
 class Section(PlanarSection):
@@ -42,6 +50,7 @@ class Section(PlanarSection):
                 raise ValueError(
                     f"networks.{name}.learns: coordinates need a machine of two drives"
                 )
+        check_curves(self, self.studies.learning_curves)
         shown = self.studies.picture
         if shown is not None and len(shown.values) != len(self.machine.drives):
             raise ValueError(f"studies.picture.values: expected {len(self.machine.drives)} of them")

@@ -4,7 +4,7 @@ from flexik.cases.crane.parts import fitting, mesh, tolerance
 from flexik.cases.crane.parts.measured.parts import measured_parts
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part
-from flexik.planar import shape
+from flexik.planar import learning_curves, shape
 
 
 def parts(section: Section) -> list[Part]:
@@ -12,4 +12,5 @@ def parts(section: Section) -> list[Part]:
     shown = section.studies.shape
     drawn = shape.part(section, shown.strokes, shown.payload)
     nominal = [study.part(section) for study in (mesh, fitting, tolerance)]
-    return [drawn, *nominal, *measured_parts(section)]
+    curves = learning_curves.parts(section, section.studies.learning_curves)
+    return [drawn, *nominal, *curves, *measured_parts(section)]
