@@ -7,15 +7,8 @@ import pytest
 
 from flexik.errors import DataError, TrainingError
 from flexik.learning.examples import Examples
-from flexik.learning.torch_module import (
-    Module,
-    code_of,
-    load_modules,
-    module_file,
-    packed,
-    train,
-    unpacked,
-)
+from flexik.learning.torch_module import Module, code_of, train
+from flexik.learning.torch_storage import load_modules, module_file, packed, unpacked
 from flexik.parameters.trainers import Adam, Lbfgs
 
 ADAM = Adam(n_iterations=10, learning_rate=0.01, batch_size=32)

@@ -12,7 +12,8 @@ from flexik.kinematics.machine_file import check_machine, manipulator_of
 from flexik.kinematics.manipulator import Manipulator
 from flexik.learning.regressor import estimator, load_regressor
 from flexik.learning.storage import load_networks
-from flexik.learning.torch_module import code_of, load_modules
+from flexik.learning.torch_module import code_of
+from flexik.learning.torch_storage import load_modules
 from flexik.machines.planar import PlanarMachine
 from flexik.parameters.conditions import ConditionSet, Points
 from flexik.parameters.model import Count, Model, Name, NotNegative, Seed, Share

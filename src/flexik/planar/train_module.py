@@ -8,7 +8,8 @@ from typing import Any
 from flexik.datasets.parts import Columns, Part, Work, Writer, text_file
 from flexik.learning.examples import Examples
 from flexik.learning.fit import restarts_csv
-from flexik.learning.torch_module import best, code_of, module_file, packed, train, unpacked
+from flexik.learning.torch_module import best, code_of, train
+from flexik.learning.torch_storage import module_file, packed, unpacked
 from flexik.machines.planar import PlanarMachine
 from flexik.parameters.networks import TorchModule
 from flexik.parameters.trainers import Adam, Lbfgs
