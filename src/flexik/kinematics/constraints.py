@@ -146,6 +146,9 @@ def blocks_of(names: list[str], equations: list[Equation]) -> list[Block]:
         if missing:
             joints = ", ".join(dict.fromkeys(e.key for e in block.equations)) or "nothing"
             what = f"leave {missing} free" if missing > 0 else f"hold {-missing} too often"
+            drives = [e.key for e in block.equations if e.drive is not None]
+            if missing < 0 and len(drives) > 1:
+                what += f"; is one of {', '.join(drives)} too many?"
             raise ParameterError(
                 f"bodies: {words}: expected each of {3 * len(block.bodies)} motions held once by "
                 f"joints and drives, but {joints} {what}"

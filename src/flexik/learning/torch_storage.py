@@ -1,4 +1,4 @@
-"""Modules of torch as JSON: exact float64, no pickle; the class is named, its code is not stored."""
+"""Modules of torch as JSON: exact float64, no pickle; a class is named, its code is elsewhere."""
 
 import dataclasses
 import json

@@ -23,8 +23,9 @@ from flexik.machines.planar import PlanarMachine
 from flexik.multibody.planar import tips
 from flexik.parameters.conditions import Points
 from flexik.planar.conditions import at, at_points
+from flexik.planar.constants import model_inputs
 from flexik.planar.fields import QUERY, target_fields
-from flexik.planar.machine import columns_of, flexible, model_inputs
+from flexik.planar.machine import columns_of, flexible
 from flexik.planar.methods import method_inputs, method_settings, trained_method
 from flexik.planar.section import PlanarSection
 from flexik.positioning.method import Columns, Method, Network, Settings

@@ -24,9 +24,9 @@ from flexik.learning.training import Architecture, Lesson, train_best
 from flexik.machines.planar import PlanarMachine
 from flexik.parameters.networks import Learner, Network, Regressor, TorchModule
 from flexik.planar import samples
+from flexik.planar.constants import model_inputs
 from flexik.planar.fields import PAYLOAD, deflection, inputs, kept, sample_fields
 from flexik.planar.learning import Predictor, kind_of, pair
-from flexik.planar.machine import model_inputs
 from flexik.planar.section import LearningCurves, PlanarSection, Selection
 from flexik.planar.train import based_on, data_inputs, described
 

@@ -9,7 +9,7 @@ from flexik.errors import ParameterError
 from flexik.kinematics.manipulator import Manipulator
 from flexik.learning.storage import load_networks
 from flexik.machines.planar import PlanarMachine
-from flexik.planar.machine import known, model_inputs
+from flexik.planar.constants import known, model_inputs
 from flexik.planar.section import PlanarSection
 from flexik.positioning.method import Ingredients, Method, Network, Settings
 from flexik.positioning.registry import Build, build_of

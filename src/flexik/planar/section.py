@@ -32,12 +32,23 @@ SAME = 1e-9
 RASTER = 40
 # What networks of learning curves may learn
 CURVES = ("deflection", "remainder")
+# Share of random targets below which too few of those drawn are reached, see planar.targets
+LEAST_SHARE = 0.05
 # Most samples of a grid
 MOST_SAMPLES = 10_000_000
+# Largest payload of samples over the machine's own mass: beyond these it is in another unit
+LIGHTEST, HEAVIEST = 0.002, 10.0
+# Largest payload that is tested, or selected by, over that of the grid
+LESS, MORE = 0.002, 2.0
 
 
 class Selection(Model):
-    """Random set that chooses among restarts."""
+    """Random set that chooses among restarts.
+
+    n_samples : drawn.
+    payload : least and largest, kg.
+    seed : of the drawing.
+    """
 
     n_samples: Count
     payload: tuple[NotNegative, NotNegative]
@@ -47,8 +58,10 @@ class Selection(Model):
 class Samples(Model):
     """Poses to learn from and to select by; left out are those with the tip behind a limit.
 
-    grid : values of every drive, m or rad, and of the payload, kg.
-    minimum_tip_x : m; None: there is no limit.
+    grid : values of every drive, m or rad, and of the `payload`, kg.
+    selection : random set that chooses among restarts.
+    minimum_tip_x : m; samples with the tip behind it are left out; not given: there is no limit.
+    maximum_failed_share : of samples without equilibrium; more fails the stage.
     """
 
     grid: dict[Name, Axis]
@@ -60,8 +73,12 @@ class Samples(Model):
 class OwnSamples(Model):
     """Samples of a file in place of a model's, see planar.own_samples.
 
+    file : CSV or Parquet, found from the folder of the project; a column for the coordinate of
+        each drive (DRIVE_stroke or DRIVE_angle), payload, tip_x and tip_y, with a unit in its
+        header, `boom_stroke (mm)`.
     columns : headers of the file, by the name of the column that they stand for.
-    selection_share, held_out_share : of the rows, drawn by `seed`; the others are learnt from.
+    selection_share, held_out_share : of the poses, drawn at random; the others are learnt from.
+    seed : of the division.
     """
 
     file: str
@@ -88,25 +105,55 @@ AnySamples = Annotated[
 ]
 
 
-Learnt = Literal["deflection", "tip", "rigid_tip", "coordinates", "remainder"]
+Learns = Literal[
+    "deflection",
+    "remainder",
+    "tip",
+    "rigid_tip",
+    "coordinates",
+    "target_shift",
+    "stroke_shift",
+    "payload_linear",
+    "payload_quadratic",
+]
 
 
 class PlanarNetwork(Network):
-    """A network of a planar machine; n_passes : of the beam theory whose remainder it learns."""
+    """A network of a planar machine.
 
-    learns: Learnt | None = None
+    learns : deflection (flexible minus rigid tip); remainder (what beam theory leaves of it); tip;
+        rigid_tip; coordinates (from tip and payload; machines of two drives); target_shift or
+        stroke_shift (what the rigid inverse of the target lacks); payload_linear or
+        payload_quadratic (deflection as a polynomial of the payload); given unless it corrects
+        another.
+    n_passes : over the deformed pose, of the beam theory whose remainder it learns.
+    """
+
+    learns: Learns | None = None
     n_passes: Passes = 2
 
 
+# What a regressor or a module learns: of the others a network alone is judged
+Learnt = Literal["deflection", "remainder", "tip", "rigid_tip", "target_shift", "stroke_shift"]
+
+
 class PlanarRegressor(Regressor):
-    """A regressor in place of a network."""
+    """A regressor in place of a network.
+
+    learns : as for a network.
+    n_passes : over the deformed pose, of the beam theory whose remainder it learns.
+    """
 
     learns: Learnt
     n_passes: Passes = 2
 
 
 class PlanarModule(TorchModule):
-    """A module of torch in place of a network."""
+    """A module of torch in place of a network.
+
+    learns : as for a network.
+    n_passes : over the deformed pose, of the beam theory whose remainder it learns.
+    """
 
     learns: Learnt
     n_passes: Passes = 2
@@ -125,6 +172,15 @@ AnyNetwork = Annotated[
 ]
 
 
+class CorrectionStudy(Model):
+    """Numbers of corrections of `methods`, on the first targets of random `conditions`."""
+
+    methods: Annotated[list[Name], Field(min_length=1)]
+    n_corrections: Annotated[list[Count], Field(min_length=1)] = [1, 2, 3, 5, 20]  # noqa: RUF012
+    conditions: Name = "workspace"
+    n_targets: Count = 500
+
+
 class LearningCurves(Model):
     """Networks from fewer and from more samples.
 
@@ -132,7 +188,9 @@ class LearningCurves(Model):
     n_samples : random ones, between the least and the largest payload of the grid.
     n_levels : payloads of the grid that are kept, as evenly spaced as it has them.
     n_restarts : of each; at most those of the network itself.
-    n_judged : random samples that judge; again with each payload `outside`, kg.
+    n_judged : random samples that judge.
+    outside : payloads with which they judge again, kg.
+    seed : of the samples.
     """
 
     networks: Annotated[tuple[Name, ...], Field(min_length=1)]
@@ -214,7 +272,7 @@ class PlanarSection(CaseSection):
                         f"methods.{name}.n_passes: {method.network!r} learns what {learnt} leave, "
                         f"got {method.n_passes}"
                     )
-        if "none" not in self.methods:
+        if "none" not in self.methods and isinstance(self.samples, Samples):
             raise ValueError("methods.none: expected, the others are compared with it")
         if taken := self.conditions.keys() & type(self.samples).model_fields.keys():
             raise ValueError(f"conditions.{min(taken)}: the name is taken")
@@ -233,10 +291,15 @@ class PlanarSection(CaseSection):
                 known = ", ".join([*drives, "payload"])
                 raise ValueError(f"samples.grid.{name}: unknown, expected one of {known}")
             low, high = drives[name].limits if name in drives else (0.0, np.inf)
-            if axis.minimum < low - SAME or axis.maximum > high + SAME:
-                raise ValueError(f"samples.grid.{name}: expected values from {low:g} to {high:g}")
+            key = f"samples.grid.{name}"
+            if axis.minimum < low - SAME:
+                raise ValueError(f"{key}.minimum: expected {low:g} or more, got {axis.minimum:g}")
+            if axis.maximum > high + SAME:
+                raise ValueError(f"{key}.maximum: expected {high:g} or less, got {axis.maximum:g}")
         if n_samples > MOST_SAMPLES:
-            raise ValueError(f"samples.grid: {n_samples:.3g} samples, at most {MOST_SAMPLES:.0g}")
+            raise ValueError(
+                f"samples.grid: expected {MOST_SAMPLES} samples or fewer, got {n_samples}"
+            )
 
 
 def check_curves(section: PlanarSection, study: LearningCurves | None) -> None:
@@ -262,6 +325,8 @@ def check(section: PlanarSection, others: Mapping[str, Any] | None = None) -> No
     except ValueError as error:
         raise ParameterError(f"{section.machine_file}: {error}") from None
     _check_learners(section)
+    if isinstance(section.samples, Samples):
+        _check_payloads(section)
     sets = {f"conditions.{name}": given for name, given in section.conditions.items()}
     for key, given in (sets | dict(others or {})).items():
         if isinstance(given, Points):
@@ -274,9 +339,10 @@ def check(section: PlanarSection, others: Mapping[str, Any] | None = None) -> No
                     f"params.yaml: {section.name}.{key}.points.{missed[0]}: the rigid machine does "
                     f"not reach ({x:g}, {y:g}) m{more}"
                 )
-        elif not _reached(section, _raster(section, given.x, given.y)).any():
+        elif (share := share_reached(section, given)) < LEAST_SHARE:
             raise ParameterError(
-                f"params.yaml: {section.name}.{key}: the machine reaches nothing in x, y"
+                f"params.yaml: {section.name}.{key}: the machine reaches {share:.1%} of x, y, "
+                f"expected {LEAST_SHARE:.0%} or more"
             )
 
 
@@ -289,6 +355,40 @@ def _check_learners(section: PlanarSection) -> None:
                 code_of(network.module)
         except TrainingError as error:
             raise ParameterError(f"params.yaml: {section.name}.networks.{name}: {error}") from None
+
+
+def share_reached(section: PlanarSection, area: Any) -> float:
+    """Share of the area `x`, `y` of random targets that the rigid machine reaches."""
+    return float(_reached(section, _raster(section, area.x, area.y)).mean())
+
+
+def payload_fault(largest: float, machine: PlanarMachine) -> str | None:
+    """What is wrong with the `largest` payload in kg of samples of `machine`, if anything."""
+    mass = sum(mass for _, _, mass in machine.masses().values())
+    if largest > HEAVIEST * mass:
+        other = f"{largest:g} g would be {largest / 1e3:g}"
+        return (
+            f"expected kg, {largest:g} is {largest / mass:.3g} times the machine's mass ({other})"
+        )
+    if 0 < largest < LIGHTEST * mass:
+        other = f"{largest:g} t would be {1e3 * largest:g}"
+        return f"expected kg, {largest:g} is nothing to a machine of {mass:.4g} ({other})"
+    return None
+
+
+def _check_payloads(section: PlanarSection) -> None:
+    """Raise ParameterError where payloads are in another unit, or far from those of the grid."""
+    of_grid = section.samples.grid["payload"].maximum
+    tested = {"samples.selection.payload": max(section.samples.selection.payload)}
+    for name, given in section.conditions.items():
+        key = "payloads" if isinstance(given, Points) else "payload"
+        tested[f"conditions.{name}.{key}"] = max(getattr(given, key))
+    for key, largest in {"samples.grid.payload.maximum": of_grid, **tested}.items():
+        fault = payload_fault(largest, section.machine)
+        if fault is None and (largest > MORE * of_grid or 0 < largest < LESS * of_grid):
+            fault = f"up to {largest:g} kg, expected about the grid's, up to {of_grid:g} kg"
+        if fault:
+            raise ParameterError(f"params.yaml: {section.name}.{key}: {fault}")
 
 
 def _reached(section: PlanarSection, points: np.ndarray) -> np.ndarray:

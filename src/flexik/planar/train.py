@@ -9,15 +9,16 @@ from typing import Any
 from flexik.datasets.parts import Part, Work
 from flexik.learning.fit import fit
 from flexik.learning.modular import combine
+from flexik.learning.payload_polynomial import Predictor
 from flexik.learning.perceptron import Network, quantities
 from flexik.learning.size_selection import read_layers
 from flexik.learning.storage import load_network
 from flexik.learning.training import Architecture
 from flexik.machines.planar import PlanarMachine
 from flexik.parameters.trainers import Stopping
+from flexik.planar.constants import known, model_inputs
 from flexik.planar.fields import TIP
-from flexik.planar.learning import Predictor, lesson
-from flexik.planar.machine import known, model_inputs
+from flexik.planar.learning import lesson
 from flexik.planar.section import PlanarNetwork, PlanarSection
 
 Theory = Callable[[PlanarMachine, int], Predictor]

@@ -11,10 +11,20 @@ from flexik.cases.crane.parts.measured.campaign_file import own_campaign
 from flexik.kinematics.crane import CraneGeometry
 from flexik.kinematics.machine_file import crane_geometry
 from flexik.parameters.conditions import Points, RandomTargets, check_different
-from flexik.parameters.model import Count, Model, Name, NotNegative, Positive, Seed
+from flexik.parameters.model import (
+    Count,
+    Interval,
+    Model,
+    Name,
+    NotNegative,
+    Positive,
+    Seed,
+    Vector,
+)
 from flexik.planar import section as planar
 from flexik.planar.section import (
     SAME,
+    CorrectionStudy,
     LearningCurves,
     PlanarNetwork,
     PlanarSection,
@@ -102,9 +112,25 @@ class ToleranceStudy(Model):
         return self
 
 
+class PointStudy(Model):
+    """Test points drawn anew: those `named` in the thesis, and whole metres of the area x, y.
+
+    methods : those that are judged on each draw, besides `none`.
+    """
+
+    named: Annotated[list[Vector], Field(min_length=1)]
+    x: Interval = (1.0, 6.0)
+    y: Interval = (-4.0, 7.0)
+    methods: Annotated[list[Name], Field(min_length=1)]
+    n_draws: Annotated[Count, Field(le=10_000)] = 100
+    seed: Seed = 4
+
+
 class Studies(Model):
     """What varies one thing."""
 
+    corrections: CorrectionStudy
+    points: PointStudy
     mesh: MeshStudy
     shape: Shape
     fitting: Fitting
@@ -171,6 +197,15 @@ class Section(PlanarSection):
             raise ValueError(f"studies.fitting.trainer: there is no trainer {fitting.trainer!r}")
 
     def _check_methods(self) -> None:
+        for key, names in (
+            ("corrections.methods", self.studies.corrections.methods),
+            ("points.methods", self.studies.points.methods),
+        ):
+            for number, name in enumerate(names):
+                if name not in self.methods:
+                    raise ValueError(f"studies.{key}.{number}: there is no method {name!r}")
+        if self.studies.corrections.conditions not in self.conditions:
+            raise ValueError("studies.corrections.conditions: there are no such conditions")
         needed = {
             f"tolerance.methods.{number}": (name, InvertedSettings)
             for number, name in enumerate(self.studies.tolerance.methods)

@@ -40,13 +40,18 @@ def prepare(
     return whole(_spring, machine=machine, calibration=calibration, published=published)
 
 
+def published_mean(file: Path) -> float:
+    """Published mean error without compensation, m; raises DataError if `file` lacks it."""
+    table = read_csv(file, ("none",), ("statistic",)).set_index("statistic")["none"]
+    if "mean_error" not in table:
+        raise DataError(f"{file}: expected a row mean_error")
+    return 1e-3 * float(table["mean_error"])
+
+
 def _spring(machine: PlanarMachine, calibration: Calibration, published: Path) -> dict[str, Writer]:
     if calibration.stiffness is not None:
         print(f"ground spring {calibration.stiffness:.6g} N m/rad, as given")
         return {".json": json_file({"constants": {SPRING: calibration.stiffness}})}
-    table = read_csv(published, ("none",), ("statistic",)).set_index("statistic")["none"]
-    if "mean_error" not in table:
-        raise DataError(f"{published}: expected a row mean_error")
     manipulator, columns = CraneManipulator(crane_geometry(machine)), columns_of(machine)
     conditions = at_points(calibration.conditions, manipulator)
     method = Uncompensated(manipulator)
@@ -55,8 +60,7 @@ def _spring(machine: PlanarMachine, calibration: Calibration, published: Path) -
         judge = tip_judge(functools.partial(tips, on_spring(machine, stiffness)))
         return pd.DataFrame(evaluate(method, conditions, judge, columns))
 
-    mean_error = 1e-3 * float(table["mean_error"])
-    fit = fit_spring(uncompensated, mean_error, calibration.stiffness_range)
+    fit = fit_spring(uncompensated, published_mean(published), calibration.stiffness_range)
     print(f"ground spring {fit.spring_stiffness:.6g} N m/rad")
     left = {"constants": {SPRING: fit.spring_stiffness}, "uncompensated": statistics(fit.errors)}
     return {".json": json_file(left)}

@@ -5,7 +5,7 @@ from typing import Any
 from flexik.cases.crane.parts.measured import adaptation, budget, campaign, identified
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part
-from flexik.planar.machine import model_inputs
+from flexik.planar.constants import model_inputs
 from flexik.planar.methods import method_settings
 
 
