@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -17,9 +17,10 @@ from flexik.learning.torch_storage import load_modules
 from flexik.machines.planar import PlanarMachine
 from flexik.parameters.conditions import ConditionSet, Points
 from flexik.parameters.model import Count, Model, Name, NotNegative, Seed, Share
-from flexik.parameters.networks import Axis, Network, Regressor, TorchModule, check_networks
+from flexik.parameters.networks import Axis, Regressor, TorchModule, check_networks
 from flexik.parameters.section import CaseSection
-from flexik.positioning.beam_model import Passes, theory
+from flexik.planar.network_section import AnyNetwork, PlanarNetwork
+from flexik.positioning.beam_model import theory
 from flexik.positioning.beam_network import Settings as BeamNetwork
 from flexik.positioning.inverted_network import InvertedSettings
 from flexik.positioning.registry import Methods, check_methods
@@ -102,73 +103,6 @@ def _which(given: Any) -> str:
 AnySamples = Annotated[
     Annotated[Samples, Tag("of_a_model")] | Annotated[OwnSamples, Tag("of_a_file")],
     Discriminator(_which),
-]
-
-
-Learns = Literal[
-    "deflection",
-    "remainder",
-    "tip",
-    "rigid_tip",
-    "coordinates",
-    "target_shift",
-    "stroke_shift",
-    "payload_linear",
-    "payload_quadratic",
-]
-
-
-class PlanarNetwork(Network):
-    """A network of a planar machine.
-
-    learns : deflection (flexible minus rigid tip); remainder (what beam theory leaves of it); tip;
-        rigid_tip; coordinates (from tip and payload; machines of two drives); target_shift or
-        stroke_shift (what the rigid inverse of the target lacks); payload_linear or
-        payload_quadratic (deflection as a polynomial of the payload); given unless it corrects
-        another.
-    n_passes : over the deformed pose, of the beam theory whose remainder it learns.
-    """
-
-    learns: Learns | None = None
-    n_passes: Passes = 2
-
-
-# What a regressor or a module learns: of the others a network alone is judged
-Learnt = Literal["deflection", "remainder", "tip", "rigid_tip", "target_shift", "stroke_shift"]
-
-
-class PlanarRegressor(Regressor):
-    """A regressor in place of a network.
-
-    learns : as for a network.
-    n_passes : over the deformed pose, of the beam theory whose remainder it learns.
-    """
-
-    learns: Learnt
-    n_passes: Passes = 2
-
-
-class PlanarModule(TorchModule):
-    """A module of torch in place of a network.
-
-    learns : as for a network.
-    n_passes : over the deformed pose, of the beam theory whose remainder it learns.
-    """
-
-    learns: Learnt
-    n_passes: Passes = 2
-
-
-def _learner(given: Any) -> str:
-    keys = given if isinstance(given, dict) else getattr(type(given), "model_fields", ())
-    return next((f"a_{kind}" for kind in ("regressor", "module") if kind in keys), "a_network")
-
-
-AnyNetwork = Annotated[
-    Annotated[PlanarNetwork, Tag("a_network")]
-    | Annotated[PlanarRegressor, Tag("a_regressor")]
-    | Annotated[PlanarModule, Tag("a_module")],
-    Discriminator(_learner),
 ]
 
 

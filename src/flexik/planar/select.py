@@ -13,7 +13,8 @@ from flexik.learning.training import Architecture
 from flexik.machines.planar import PlanarMachine
 from flexik.parameters.trainers import Stopping
 from flexik.planar.learning import lesson
-from flexik.planar.section import PlanarNetwork, PlanarSection
+from flexik.planar.network_section import PlanarNetwork
+from flexik.planar.section import PlanarSection
 from flexik.planar.train import based_on, data_inputs, described, part
 
 CORRECTED = "corrected"

@@ -19,7 +19,8 @@ from flexik.parameters.trainers import Stopping
 from flexik.planar.constants import known, model_inputs
 from flexik.planar.fields import TIP
 from flexik.planar.learning import lesson
-from flexik.planar.section import PlanarNetwork, PlanarSection
+from flexik.planar.network_section import PlanarNetwork
+from flexik.planar.section import PlanarSection
 
 Theory = Callable[[PlanarMachine, int], Predictor]
 
