@@ -6,7 +6,7 @@ that none of them learnt.
 """
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +25,14 @@ from flexik.machines.planar import PlanarMachine
 from flexik.parameters.networks import Learner, Network, Regressor, TorchModule
 from flexik.planar import samples
 from flexik.planar.constants import model_inputs
-from flexik.planar.fields import PAYLOAD, deflection, inputs, kept, sample_fields
-from flexik.planar.learning import Predictor, kind_of, pair
+from flexik.planar.fields import PAYLOAD, kept, sample_fields
+from flexik.planar.learning import Kind, Predictor, kind_of, pair
 from flexik.planar.section import LearningCurves, PlanarSection, Selection
 from flexik.planar.train import based_on, data_inputs, described
+
+Array = NDArray[np.float64]
+# Inputs and outputs of a network
+Pair = tuple[Array, Array]
 
 FOLDER = "learning_curves"
 RANDOM, LEVELS = "random", "levels"
@@ -126,9 +130,15 @@ def prepare(
     sets = [(RANDOM, 0, drawn[:n]) for n in n_samples]
     sets += [(LEVELS, n, with_levels(whole, n)) for n in n_levels]
     base = based_on(machine, **model)
+    learnt = functools.partial(pair, kind=kind, machine=machine, base=base)
     given = seed, network, n_restarts, trainers
-    learn = functools.partial(_learnt, machine, kind, *given, base, chosen_by)
-    return Work(functools.partial(_judged, machine, learn, base, judges), sets, rows(*FIELDS))
+    learn = functools.partial(_learnt, kind_of(machine, kind), *given, learnt(chosen_by))
+    items = [(design, n_levels, len(table), learnt(table)) for design, n_levels, table in sets]
+    asked = [
+        (judge[PAYLOAD.name].iloc[0] if number else np.nan, *learnt(judge))
+        for number, judge in enumerate(judges)
+    ]
+    return Work(functools.partial(_judged, learn, asked), items, rows(*FIELDS))
 
 
 def with_levels(table: pd.DataFrame, n_levels: int) -> pd.DataFrame:
@@ -139,24 +149,19 @@ def with_levels(table: pd.DataFrame, n_levels: int) -> pd.DataFrame:
 
 
 def _learnt(
-    machine: PlanarMachine,
-    kind: str,
+    columns: Kind,
     seed: int,
     network: Any,
     n_restarts: int,
     trainers: list[Any],
-    base: Predictor | None,
-    chosen_by: pd.DataFrame,
-    table: pd.DataFrame,
+    chosen: Pair,
+    learnt: Pair,
 ) -> Predictor:
-    learnt, chosen = (pair(each, kind, machine, base) for each in (table, chosen_by))
     if isinstance(network, Regressor):
         return regressor.fit(network.regressor, seed, Examples(*learnt, chosen))
     if isinstance(network, TorchModule):
-        return torch_module.train_best(
-            network.module, Examples(*learnt, chosen), trainers, seed, n_restarts
-        )
-    columns = kind_of(machine, kind)
+        examples = Examples(*learnt, chosen)
+        return torch_module.train_best(network.module, examples, trainers, seed, n_restarts)
     names = quantities(columns.inputs), quantities(columns.outputs)
     architecture = Architecture(network.sizes[0], network.activation)
     lesson = Lesson(*learnt, *names, architecture, trainers[0], seed, chosen)
@@ -164,26 +169,22 @@ def _learnt(
 
 
 def _judged(
-    machine: PlanarMachine,
-    learn: Any,
-    base: Predictor | None,
-    judges: list[pd.DataFrame],
-    given: tuple[str, int, pd.DataFrame],
+    learn: Callable[[Pair], Predictor],
+    asked: list[tuple[float, Array, Array]],
+    given: tuple[str, int, int, Pair],
 ) -> Mapping[str, NDArray]:
-    design, n_levels, table = given
+    """A row a set of samples that judge: what is not predicted of their outputs moves the tip."""
+    design, n_levels, n_samples, learnt = given
     try:
-        predictors = [learn(table), *([] if base is None else [base])]
+        network = learn(learnt)
     except TrainingError:  # too few samples for so many weights
-        predictors = []
+        network = None
     found = []
-    for number, judge in enumerate(judges):
-        values = judge[inputs(machine)].to_numpy()
-        error = np.full(len(judge), np.nan)
-        if predictors:
-            predicted = sum(each.predict(values) for each in predictors)
-            error = np.hypot(*(predicted - deflection(judge)).T)
-        payload = judge[PAYLOAD.name].iloc[0] if number else np.nan
+    for payload, inputs, outputs in asked:
+        error = np.full(len(inputs), np.nan)
+        if network is not None:
+            error = np.hypot(*(network.predict(inputs) - outputs).T)
         measures = error.mean(), np.quantile(error, 0.99), error.max()
-        found.append((design, len(table), n_levels, payload, *measures))
+        found.append((design, n_samples, n_levels, payload, *measures))
     columns = zip(*found, strict=True)
     return {field.name: np.array(c) for field, c in zip(FIELDS, columns, strict=True)}

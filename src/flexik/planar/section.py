@@ -131,7 +131,7 @@ class LearningCurves(Model):
     n_samples: tuple[Count, ...] = (250, 1000, 4000)
     n_levels: tuple[Annotated[int, Field(ge=2)], ...] = (2, 3, 5, 10)
     n_restarts: Count = 2
-    n_judged: Count = 2000
+    n_judged: Count = 1000
     outside: tuple[NotNegative, ...] = ()
     seed: Seed = 1
 
