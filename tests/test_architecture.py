@@ -43,6 +43,7 @@ HOMES = {
     "exudyn": "multibody",
     "torch": "learning",
     "sklearn": "learning",
+    "skops": "learning",
     "matplotlib": "reporting",
     "jinja2": "reporting",
     "pyarrow": "datasets",

@@ -21,6 +21,7 @@ from flexik.learning.storage import network_file
 from flexik.learning.training import TrainingRecord
 from flexik.planar import evaluate
 from flexik.planar.methods import method_of
+from flexik.planar.network_section import PlanarNetwork
 from flexik.positioning.combined import Combined
 from flexik.positioning.inversion import GaussNewton
 
@@ -51,6 +52,18 @@ def network_of(learns, seed):
     )
 
 
+def of_thesis():
+    """The crane with networks of the kinds of the thesis, and methods that need no others."""
+    section = crane_case.section()
+    networks = {
+        name: given
+        for name, given in section.networks.items()
+        if isinstance(given, PlanarNetwork) and (given.learns or "correction") in KINDS
+    }
+    methods = {k: m for k, m in section.methods.items() if m.network in {None, *networks}}
+    return section.model_copy(update={"networks": networks, "methods": methods})
+
+
 @pytest.fixture
 def project(tmp_path, monkeypatch):
     """Folder with targets and networks that never learnt anything, and few conditions."""
@@ -63,7 +76,7 @@ def project(tmp_path, monkeypatch):
     grid = {f.name: np.zeros(1, dtype=f.dtype) for f in SAMPLE_FIELDS}
     write_table(tmp_path / "data/crane/samples/grid.parquet", grid, SAMPLE_FIELDS)
     write_table(tmp_path / "data/crane/samples/workspace.parquet", columns, TARGET_FIELDS)
-    for name, given in crane_case.section().networks.items():
+    for name, given in of_thesis().networks.items():
         made = [
             (
                 network_of(given.learns or "correction", seed),
@@ -81,7 +94,7 @@ def project(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def section():
-    section = crane_case.section()
+    section = of_thesis()
     points = section.conditions["published"].model_copy(
         update={"points": [(4.0, 1.0), (2.0, 2.0)], "payloads": [30.0, 470.0]}
     )

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -107,9 +107,69 @@ class Network(Model):
         return any(isinstance(n, Sizes) for n in self.layers)
 
 
-def check_networks(networks: Mapping[str, Network], trainers: Mapping[str, object]) -> None:
+class Learner(Model):
+    """What stands in place of a network of the same `learns`, and corrects none.
+
+    learns : as for a network.
+    seed : of what is drawn at random.
+    """
+
+    corrects: ClassVar[None] = None
+    is_selected: ClassVar[bool] = False
+    learns: Name
+    seed: Seed = 1
+
+
+class Regressor(Learner):
+    """A regressor of scikit-learn.
+
+    regressor : its name and options, see learning.regressor.
+    """
+
+    n_restarts: ClassVar[int] = 1
+    regressor: dict[str, Any]
+
+    @property
+    def trainer(self) -> str:
+        """What stands for it in a table: its name, or that of the last step of a Pipeline."""
+        steps = self.regressor.get("steps") or [self.regressor]
+        return str(steps[-1].get("name"))
+
+
+class TorchModule(Learner):
+    """A module of torch.
+
+    module : options, and `name` unless it is learning.torch_layers, see learning.torch_module.
+    n_restarts : trainings from random weights, of which the least selection error is kept.
+    trainers : names under trainers, of kind adam or lbfgs: they train one after the other.
+    device : auto takes a GPU where there is one, and results then depend on the machine.
+    """
+
+    module: dict[str, Any]
+    n_restarts: Restarts
+    trainers: Annotated[tuple[Name, ...], Field(min_length=1)] = ("torch_adam", "torch_lbfgs")
+    device: Literal["cpu", "auto"] = "cpu"
+
+    @property
+    def trainer(self) -> str:
+        """What stands for it in a table."""
+        return " + ".join(self.trainers)
+
+
+def check_networks(
+    networks: Mapping[str, Network | Learner], trainers: Mapping[str, object]
+) -> None:
     """Raise ValueError unless trainers and corrected networks that `networks` name are there."""
     for name, network in networks.items():
+        if isinstance(network, TorchModule):
+            for number, trainer in enumerate(network.trainers):
+                if getattr(trainers.get(trainer), "kind", None) not in ("adam", "lbfgs"):
+                    raise ValueError(
+                        f"networks.{name}.trainers.{number}: expected a trainer of kind adam or "
+                        f"lbfgs, got {trainer!r}"
+                    )
+        if not isinstance(network, Network):
+            continue
         named = {"trainer": network.trainer}
         if network.is_selected:
             named["select.trainer"] = network.select.trainer
@@ -124,8 +184,12 @@ def check_networks(networks: Mapping[str, Network], trainers: Mapping[str, objec
         if (network.learns is None) == (network.corrects is None):
             raise ValueError(f"networks.{name}.learns: expected either this or corrects")
         other = networks.get(network.corrects or "")
-        if network.corrects is not None and (other is None or other.corrects is not None):
-            known = ", ".join(n for n, given in networks.items() if given.corrects is None)
+        if network.corrects is not None and (
+            not isinstance(other, Network) or other.corrects is not None
+        ):
+            known = ", ".join(
+                n for n, g in networks.items() if isinstance(g, Network) and g.corrects is None
+            )
             raise ValueError(
                 f"networks.{name}.corrects: {network.corrects!r} is no network that can be "
                 f"corrected ({known})"

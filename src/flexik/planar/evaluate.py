@@ -5,7 +5,7 @@ with the networks of the best restarts, of which the very best by selection erro
 """
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from flexik.datasets.tables import Field, read_table
 from flexik.evaluation.conditions import Conditions
 from flexik.evaluation.errors import Judge, evaluate, fields_of, statistics, tip_judge
 from flexik.kinematics.machine_file import manipulator_of
-from flexik.learning.storage import Trained, TrainingRecord, load_networks
+from flexik.learning.storage import TrainingRecord, load_networks
 from flexik.machines.planar import PlanarMachine
 from flexik.multibody.planar import tips
 from flexik.parameters.conditions import Points
@@ -28,7 +28,7 @@ from flexik.planar.fields import QUERY, target_fields
 from flexik.planar.machine import columns_of, flexible
 from flexik.planar.methods import method_inputs, method_settings, trained_method
 from flexik.planar.section import PlanarSection
-from flexik.positioning.method import Columns, Method, Settings
+from flexik.positioning.method import Columns, Method, Network, Settings
 from flexik.positioning.registry import Build
 
 # Many rows at once pay for searches, of which a few take most steps
@@ -64,7 +64,11 @@ def _part(section: PlanarSection, conditions: str, name: str) -> Part:
     if isinstance(given, Points):
         settings["points"] = given
         # a genetic algorithm takes too long to be asked again with every network
-        if method.network is not None and getattr(method, "genetic", None) is None:
+        if (
+            method.network is not None
+            and getattr(method, "genetic", None) is None
+            and section.has_restarts(method.network)
+        ):
             inputs["restarts"] = section.data / "networks" / f"{method.network}.restarts.json"
     else:
         settings["n_targets"] = method.n_targets
@@ -86,6 +90,7 @@ def prepare(
     points: Points | None = None,
     targets: Path | None = None,
     n_targets: int | None = None,
+    load: Callable[[Path], Any] = load_networks,
 ) -> Work:
     """Ask the method in pieces, then with the network of every restart."""
     manipulator = manipulator_of(machine)
@@ -98,12 +103,18 @@ def prepare(
         conditions = at(query, np.arange(len(query)), manipulator)
     built = flexible(machine, constants)
     with_network = functools.partial(
-        trained_method, method, build, manipulator, samples=samples, machine=built.machine
+        trained_method,
+        method,
+        build,
+        manipulator,
+        samples=samples,
+        machine=built.machine,
+        load=load,
     )
     asked = with_network(network)
     items: list[Any] = [(asked, piece) for piece in conditions.chunks(ROWS)]
     n_pieces, columns = len(items), columns_of(machine)
-    starts = [] if restarts is None else _best(load_networks(restarts))
+    starts = [] if restarts is None else _best(load(restarts))
     items += [(with_network(other), conditions) for other, _ in starts]
 
     def finish(results: list[Mapping[str, NDArray]]) -> Mapping[str, Writer]:
@@ -132,7 +143,7 @@ def _errors(
     return evaluate(method, conditions, judge, columns)
 
 
-def _best(starts: Sequence[Trained]) -> list[Trained]:
+def _best(starts: Sequence[tuple[Network, TrainingRecord]]) -> list[tuple[Network, TrainingRecord]]:
     """Those of the least selection errors, in the order of their restarts."""
     best = sorted(starts, key=lambda start: start[1].rank)[:N_SPREAD]
     return sorted(best, key=lambda start: start[1].restart)

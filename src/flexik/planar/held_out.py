@@ -1,12 +1,13 @@
 """Errors of networks on samples that they never saw: where they put the tip, and where it was."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from flexik.datasets.parts import Part, Work, Writer, table, whole
 from flexik.datasets.tables import Field, read_table
-from flexik.learning.storage import load_network
 from flexik.machines.planar import PlanarMachine
 from flexik.planar.fields import PAYLOAD, inputs, sample_fields
 from flexik.planar.section import PlanarSection
@@ -22,24 +23,40 @@ def parts(section: PlanarSection) -> list[Part]:
         Part(
             f"held_out/{name}",
             prepare,
-            {**shared, "deflects": network.learns == "deflection"},
-            {"samples": samples, "network": section.data / f"networks/{name}.json"},
+            {
+                **shared,
+                "deflects": network.learns == "deflection",
+                "load": section.load_of(name),
+            },
+            {"samples": samples, "network": section.file_of(name)},
         )
         for name, network in section.networks.items()
         if network.learns in ("deflection", "tip", None)
     ]
 
 
-def prepare(*, machine: PlanarMachine, deflects: bool, samples: Path, network: Path) -> Work:
+def prepare(
+    *,
+    machine: PlanarMachine,
+    deflects: bool,
+    load: Callable[[Path], Any],
+    samples: Path,
+    network: Path,
+) -> Work:
     """A table of FIELDS."""
-    return whole(_errors, machine=machine, deflects=deflects, samples=samples, network=network)
+    given = {"machine": machine, "deflects": deflects, "load": load}
+    return whole(_errors, **given, samples=samples, network=network)
 
 
 def _errors(
-    machine: PlanarMachine, deflects: bool, samples: Path, network: Path
+    machine: PlanarMachine,
+    deflects: bool,
+    load: Callable[[Path], Any],
+    samples: Path,
+    network: Path,
 ) -> dict[str, Writer]:
     frame = read_table(samples, sample_fields(machine))
-    found = load_network(network)[0].predict(frame[inputs(machine)].to_numpy())
+    found = load(network)[0][0].predict(frame[inputs(machine)].to_numpy())
     if deflects:
         found = found + frame[["rigid_x", "rigid_y"]].to_numpy()
     error = np.hypot(*(found - frame[["tip_x", "tip_y"]].to_numpy()).T)

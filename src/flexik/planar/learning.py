@@ -133,7 +133,7 @@ def lesson(
         asked, answers = chosen[inputs_of(machine)].to_numpy(), deflection(chosen)
         judge = functools.partial(error_of_deflection, nodes, asked, answers)
     else:
-        (inputs, outputs), chosen_by = (_pair(table, kind, machine, base) for table in tables)
+        (inputs, outputs), chosen_by = (pair(table, kind, machine, base) for table in tables)
     if kind == "coordinates" and chosen_by is not None:
         reach = np.ptp(tables[0][_names(TIP)].to_numpy(), axis=0) / 2.0
         judge = functools.partial(error_at_tip, manipulator_of(machine), *chosen_by, reach)
@@ -212,9 +212,10 @@ def learnt_rows(table: pd.DataFrame, kind: str, machine: PlanarMachine) -> pd.Da
     return table[on_branch(table, machine)] if columns.one_branch else table
 
 
-def _pair(
-    table: pd.DataFrame, kind: str, machine: PlanarMachine, base: Predictor | None
+def pair(
+    table: pd.DataFrame, kind: str, machine: PlanarMachine, base: Predictor | None = None
 ) -> tuple[Array, Array]:
+    """Inputs (n, p) and outputs (n, q) of a network of `kind`; `base` as for `lesson`."""
     table, columns = learnt_rows(table, kind, machine), kind_of(machine, kind)
     if kind in ("target_shift", "stroke_shift"):
         return _shifts(table, kind, machine)
@@ -223,8 +224,8 @@ def _pair(
         found[REMAINDER] = deflection(table) - base.predict(table[inputs_of(machine)].to_numpy())
     elif base is not None:
         found[CORRECTION] = correction(table, machine, base)
-    for pair, values in found.items():
-        table = table.assign(**dict(zip(_names(pair), values.T, strict=True)))
+    for fields, values in found.items():
+        table = table.assign(**dict(zip(_names(fields), values.T, strict=True)))
     inputs, outputs = (
         table[_names(fields)].to_numpy() for fields in (columns.inputs, columns.outputs)
     )

@@ -1,13 +1,13 @@
 """Methods with the networks that the pipeline trained, as parts name and read them."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from flexik.datasets.tables import read_table
 from flexik.errors import ParameterError
 from flexik.kinematics.manipulator import Manipulator
-from flexik.learning.storage import load_network
+from flexik.learning.storage import load_networks
 from flexik.machines.planar import PlanarMachine
 from flexik.planar.constants import known, model_inputs
 from flexik.planar.section import PlanarSection
@@ -16,9 +16,10 @@ from flexik.positioning.registry import Build, build_of
 
 
 def method_settings(section: PlanarSection, name: str) -> dict[str, Any]:
-    """Settings `method` and `build` of a part that asks method `name` of params.yaml."""
+    """Settings `method`, `build` and `load` of a part that asks method `name` of params.yaml."""
     method = section.methods[name].model_copy(update={"n_targets": None})
-    return {"method": method, "build": build_of(method)}
+    found = {"method": method, "build": build_of(method)}
+    return found if method.network is None else found | {"load": section.load_of(method.network)}
 
 
 def method_inputs(section: PlanarSection, name: str) -> dict[str, Any]:
@@ -27,7 +28,7 @@ def method_inputs(section: PlanarSection, name: str) -> dict[str, Any]:
     samples = {name: section.data / "samples" / f"{name}.parquet" for name in method.reads}
     inputs: dict[str, Any] = {"samples": samples}
     if method.network is not None:
-        inputs["network"] = section.data / "networks" / f"{method.network}.json"
+        inputs["network"] = section.file_of(method.network)
     return inputs
 
 
@@ -38,15 +39,15 @@ def trained_method(
     network: Path | Network | None = None,
     samples: Mapping[str, Path] | None = None,
     machine: PlanarMachine | None = None,
+    load: Callable[[Path], Any] = load_networks,
 ) -> Method:
     """The method of `method_settings` with its trained `network` and its tables of samples.
 
     machine : all constants known, for methods that ask it.
     """
-    if isinstance(network, Path):
-        network = load_network(network)[0]
+    trained: Network | None = load(network)[0][0] if isinstance(network, Path) else network
     tables = {name: read_table(path) for name, path in (samples or {}).items()}
-    return build(method, Ingredients(manipulator, network, tables, machine))
+    return build(method, Ingredients(manipulator, trained, tables, machine))
 
 
 def method_of(section: PlanarSection, name: str) -> Method:

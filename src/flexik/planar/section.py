@@ -1,22 +1,28 @@
 """The section of a planar flexible machine in params.yaml."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from flexik.errors import ParameterError
+from flexik.errors import ParameterError, TrainingError
 from flexik.kinematics.machine_file import check_machine, manipulator_of
 from flexik.kinematics.manipulator import Manipulator
+from flexik.learning.regressor import estimator, load_regressor
+from flexik.learning.storage import load_networks
+from flexik.learning.torch_module import code_of
+from flexik.learning.torch_storage import load_modules
 from flexik.machines.planar import PlanarMachine
 from flexik.parameters.conditions import ConditionSet, Points
 from flexik.parameters.model import Count, Model, Name, NotNegative, Seed, Share
-from flexik.parameters.networks import Axis, Network, check_networks
+from flexik.parameters.networks import Axis, Regressor, TorchModule, check_networks
 from flexik.parameters.section import CaseSection
-from flexik.positioning.beam_model import Passes, theory
+from flexik.planar.network_section import AnyNetwork, PlanarNetwork
+from flexik.positioning.beam_model import theory
 from flexik.positioning.beam_network import Settings as BeamNetwork
+from flexik.positioning.inverted_network import InvertedSettings
 from flexik.positioning.registry import Methods, check_methods
 
 Part = Annotated[float, Field(gt=0, lt=1)]
@@ -25,6 +31,8 @@ Part = Annotated[float, Field(gt=0, lt=1)]
 SAME = 1e-9
 # Places a side of the raster on which an area must have one that is reached
 RASTER = 40
+# What networks of learning curves may learn
+CURVES = ("deflection", "remainder")
 # Share of random targets below which too few of those drawn are reached, see planar.targets
 LEAST_SHARE = 0.05
 # Most samples of a grid
@@ -98,34 +106,6 @@ AnySamples = Annotated[
 ]
 
 
-Learns = Literal[
-    "deflection",
-    "remainder",
-    "tip",
-    "rigid_tip",
-    "coordinates",
-    "target_shift",
-    "stroke_shift",
-    "payload_linear",
-    "payload_quadratic",
-]
-
-
-class PlanarNetwork(Network):
-    """A network of a planar machine.
-
-    learns : deflection (flexible minus rigid tip); remainder (what beam theory leaves of it); tip;
-        rigid_tip; coordinates (from tip and payload; machines of two drives); target_shift or
-        stroke_shift (what the rigid inverse of the target lacks); payload_linear or
-        payload_quadratic (deflection as a polynomial of the payload); given unless it corrects
-        another.
-    n_passes : over the deformed pose, of the beam theory whose remainder it learns.
-    """
-
-    learns: Learns | None = None
-    n_passes: Passes = 2
-
-
 class CorrectionStudy(Model):
     """Numbers of corrections of `methods`, on the first targets of random `conditions`."""
 
@@ -135,12 +115,33 @@ class CorrectionStudy(Model):
     n_targets: Count = 500
 
 
+class LearningCurves(Model):
+    """Networks from fewer and from more samples.
+
+    networks : names of networks of deflection or remainder whose size is given.
+    n_samples : random ones, between the least and the largest payload of the grid.
+    n_levels : payloads of the grid that are kept, as evenly spaced as it has them.
+    n_restarts : of each; at most those of the network itself.
+    n_judged : random samples that judge.
+    outside : payloads with which they judge again, kg.
+    seed : of the samples.
+    """
+
+    networks: Annotated[tuple[Name, ...], Field(min_length=1)]
+    n_samples: tuple[Count, ...] = (250, 1000, 4000)
+    n_levels: tuple[Annotated[int, Field(ge=2)], ...] = (2, 3, 5, 10)
+    n_restarts: Count = 2
+    n_judged: Count = 1000
+    outside: tuple[NotNegative, ...] = ()
+    seed: Seed = 1
+
+
 class PlanarSection(CaseSection):
     """A planar flexible machine."""
 
     machine: PlanarMachine
     samples: Samples
-    networks: Annotated[dict[Name, PlanarNetwork], Field(min_length=1)]
+    networks: Annotated[dict[Name, AnyNetwork], Field(min_length=1)]
     conditions: dict[Name, ConditionSet]
     methods: Methods
 
@@ -160,6 +161,22 @@ class PlanarSection(CaseSection):
         own = [self.samples.file] if isinstance(self.samples, OwnSamples) else []
         return [Path(file) for file in (*self.machine.section_files.values(), *own)]
 
+    def file_of(self, name: str) -> Path:
+        """File of the trained network `name`."""
+        extension = "skops" if isinstance(self.networks[name], Regressor) else "json"
+        return self.data / f"networks/{name}.{extension}"
+
+    def has_restarts(self, name: str) -> bool:
+        """Whether network `name` comes from several starts, of which a file keeps all."""
+        return not isinstance(self.networks[name], Regressor)
+
+    def load_of(self, name: str) -> Callable[[Path], Any]:
+        """The function that reads such files: networks and their records."""
+        network = self.networks[name]
+        if isinstance(network, TorchModule):
+            return load_modules
+        return load_regressor if isinstance(network, Regressor) else load_networks
+
     def base_of(self, name: str) -> dict[str, Any]:
         """Settings of the beam theory whose remainder network `name` learns, if it does."""
         network = self.networks[name]
@@ -175,10 +192,13 @@ class PlanarSection(CaseSection):
         for name, network in self.networks.items():
             if network.corrects and self.networks[network.corrects].learns != "rigid_tip":
                 raise ValueError(f"networks.{name}.corrects: expected a network of the rigid_tip")
-            if len(network.layers) != 1:
+            if isinstance(network, PlanarNetwork) and len(network.layers) != 1:
                 raise ValueError(f"networks.{name}.n_hidden: expected one layer")
         check_methods(self.methods, self.networks)
         for name, method in self.methods.items():
+            asked = self.networks.get(method.network or "")
+            if isinstance(method, InvertedSettings) and not isinstance(asked, PlanarNetwork):
+                raise ValueError(f"methods.{name}.network: expected one of n_hidden units")
             if isinstance(method, BeamNetwork):
                 learnt = self.networks[method.network or ""].n_passes
                 if method.n_passes != learnt:
@@ -216,6 +236,19 @@ class PlanarSection(CaseSection):
             )
 
 
+def check_curves(section: PlanarSection, study: LearningCurves | None) -> None:
+    """Raise ValueError unless the networks of `study` are there and can be judged by the tip."""
+    if study and not isinstance(section.samples, Samples):
+        raise ValueError("studies.learning_curves: expected none, samples of a file have no model")
+    for number, name in enumerate(study.networks if study else ()):
+        network = section.networks.get(name)
+        if network is None or network.is_selected or network.learns not in CURVES:
+            raise ValueError(
+                f"studies.learning_curves.networks.{number}: expected a network of given size that "
+                f"learns {' or '.join(CURVES)}, got {name!r}"
+            )
+
+
 def check(section: PlanarSection, others: Mapping[str, Any] | None = None) -> None:
     """The machine is one, and targets are reached: those of conditions, and `others` by key.
 
@@ -225,6 +258,7 @@ def check(section: PlanarSection, others: Mapping[str, Any] | None = None) -> No
         check_machine(section.machine)
     except ValueError as error:
         raise ParameterError(f"{section.machine_file}: {error}") from None
+    _check_learners(section)
     if isinstance(section.samples, Samples):
         _check_payloads(section)
     sets = {f"conditions.{name}": given for name, given in section.conditions.items()}
@@ -244,6 +278,17 @@ def check(section: PlanarSection, others: Mapping[str, Any] | None = None) -> No
                 f"params.yaml: {section.name}.{key}: the machine reaches {share:.1%} of x, y, "
                 f"expected {LEAST_SHARE:.0%} or more"
             )
+
+
+def _check_learners(section: PlanarSection) -> None:
+    for name, network in section.networks.items():
+        try:
+            if isinstance(network, Regressor):
+                estimator(network.regressor)
+            elif isinstance(network, TorchModule):
+                code_of(network.module)
+        except TrainingError as error:
+            raise ParameterError(f"params.yaml: {section.name}.networks.{name}: {error}") from None
 
 
 def share_reached(section: PlanarSection, area: Any) -> float:

@@ -13,6 +13,7 @@ from flexik.learning.training import Architecture
 from flexik.machines.planar import PlanarMachine
 from flexik.parameters.trainers import Stopping
 from flexik.planar.learning import lesson
+from flexik.planar.network_section import PlanarNetwork
 from flexik.planar.section import PlanarSection
 from flexik.planar.train import based_on, data_inputs, described, part
 
@@ -21,7 +22,8 @@ CORRECTED = "corrected"
 
 def parts(section: PlanarSection) -> list[Part]:
     """A part a network whose size is to be chosen, and `corrected/RIGID` for corrections."""
-    selected = {n: network for n, network in section.networks.items() if network.is_selected}
+    perceptrons = {n: g for n, g in section.networks.items() if isinstance(g, PlanarNetwork)}
+    selected = {n: network for n, network in perceptrons.items() if network.is_selected}
     corrected = sorted({n.corrects for n in selected.values() if n.corrects is not None})
     sizes = section.data / "sizes"
     found = [part(section, name, f"{CORRECTED}/{name}", sizes) for name in corrected]

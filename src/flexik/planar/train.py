@@ -19,19 +19,16 @@ from flexik.parameters.trainers import Stopping
 from flexik.planar.constants import known, model_inputs
 from flexik.planar.fields import TIP
 from flexik.planar.learning import lesson
+from flexik.planar.network_section import PlanarNetwork
 from flexik.planar.section import PlanarSection
 
 Theory = Callable[[PlanarMachine, int], Predictor]
 
 
-def parts(section: PlanarSection) -> list[Part]:
-    """A part a network."""
-    return [part(section, name, name, section.data / "networks") for name in section.networks]
-
-
 def part(section: PlanarSection, name: str, as_name: str, rigid_folder: Path) -> Part:
     """Network `name` as part `as_name`; the rigid one that it corrects is in `rigid_folder`."""
     network = section.networks[name]
+    assert isinstance(network, PlanarNetwork)
     settings = described(section, name) | {
         "activation": network.activation,
         "n_hidden": None if network.is_selected else network.sizes[0],

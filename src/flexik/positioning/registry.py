@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Union
 from pydantic import BeforeValidator, Field
 
 from flexik.parameters.model import Name
-from flexik.parameters.networks import Network
+from flexik.parameters.networks import Learner, Network
 from flexik.positioning.method import Ingredients, Method, Settings
 
 Build = Callable[[Any, Ingredients], Method]
@@ -67,7 +67,9 @@ def about(settings: Settings) -> str:
     return " ".join(first.partition(": ")[2].split()).rstrip(".")
 
 
-def check_methods(methods: Mapping[str, Settings], networks: Mapping[str, Network]) -> None:
+def check_methods(
+    methods: Mapping[str, Settings], networks: Mapping[str, Network | Learner]
+) -> None:
     """Raise ValueError unless each of `methods` names a network that learnt what it needs."""
     for name, method in methods.items():
         if method.needs is None:

@@ -83,7 +83,8 @@ def values(results: Results) -> dict[str, Any]:
         "methods": methods,
         "about": {label: about(method) for label, method in section.methods.items()},
         "of_published_size": all(
-            section.networks[name].n_hidden == results.published_size(name) for name in used
+            getattr(section.networks[name], "n_hidden", None) == results.published_size(name)
+            for name in used
         ),
         "reached": REACHED,
         "meaning": STATUS_MEANING,

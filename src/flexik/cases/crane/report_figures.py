@@ -11,7 +11,7 @@ from flexik.cases.crane.report_results import Results
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.status import REACHED
 from flexik.planar.fields import deflection
-from flexik.reporting import kinds, plane, style
+from flexik.reporting import curves, kinds, plane, style
 from flexik.reporting.chart import Axis, Layer, chart
 from flexik.reporting.report import Drawing, draw
 from flexik.reporting.style import MM
@@ -43,6 +43,7 @@ def figures(results: Results) -> dict[str, Drawing]:
         **_sizes(results),
         "training_race": _race(results.training_curves),
         "under_and_overfitting": _fitting(results),
+        **({"learning_curves": curves.figure(results.curves)} if len(results.curves) else {}),
     }
 
 
@@ -329,7 +330,7 @@ def _sizes(results: Results) -> dict[str, Drawing]:
     chosen = {name: size for name, (_, size) in results.studies.items()}
     found = {}
     for name, sizes in frames.items():
-        tolerance = 100 * results.section.networks[name].select.tolerance
+        tolerance = 100 * results.section.networks[name].select.tolerance  # type: ignore[union-attr]
         rule = f"smallest size within {tolerance:g} %" if tolerance else "size"
         rule = f"Choice: {rule} of the least selection error"
         options = {"chosen": chosen[name], "published": published[name], "titles": rule}

@@ -21,7 +21,8 @@ from flexik.evaluation.operations import (
 from flexik.files import read_json
 from flexik.learning.perceptron import Network
 from flexik.learning.size_selection import by_size, read_layers
-from flexik.learning.storage import load_network
+from flexik.learning.torch_module import Module
+from flexik.planar import learning_curves
 from flexik.planar.fields import kept
 from flexik.planar.learning import correction
 from flexik.positioning.inverted_network import InvertedSettings
@@ -59,6 +60,7 @@ class Results:
     studies : frame of learning.size_selection.by_size, and the chosen size, by network.
     by_corrections, draws : tables of planar.corrections and of parts.points.
     query_times, training_curves : measured by benchmarks.
+    curves : of planar.learning_curves.
     """
 
     section: Section
@@ -72,7 +74,7 @@ class Results:
     mesh: pd.DataFrame
     training: pd.DataFrame
     studies: Mapping[str, tuple[pd.DataFrame, int]]
-    trained: Mapping[str, Network]
+    trained: Mapping[str, Any]
     tolerances: pd.DataFrame
     fitting: pd.DataFrame
     by_corrections: pd.DataFrame
@@ -80,6 +82,7 @@ class Results:
     query_times: pd.DataFrame
     training_curves: pd.DataFrame
     shape: Mapping[str, Any]
+    curves: pd.DataFrame
 
     @property
     def methods(self) -> dict[str, Settings]:
@@ -148,6 +151,15 @@ class Results:
         names = [name for name in self.methods if name in found and name != "exact"]
         return min(names, key=lambda name: found[name]["mean_error"])
 
+    def numbers(self, network: str) -> int:
+        """Numbers that trained `network` keeps; of a regressor those that its file has room for."""
+        found = self.trained[network]
+        if isinstance(found, Network):
+            return found.n_weights
+        if isinstance(found, Module):
+            return sum(array.size for array in found.arrays.values())
+        return self.section.file_of(network).stat().st_size // 8
+
     def memory(self, label: str) -> int:
         """Numbers that a controller needs of method `label`, as float64, in bytes.
 
@@ -157,7 +169,7 @@ class Results:
         method, machine = self.section.methods[label], self.section.machine
         n = 0
         if method.network is not None:
-            n += sum(matrix.size for matrix in self.trained[method.network].weights)
+            n += self.numbers(method.network)
         elif method.reads:
             n += 2 * len(self.grid)
         if method.asks_machine:
@@ -202,6 +214,8 @@ class Results:
         if method.network is None:
             return None
         network = self.trained[method.network]
+        if not isinstance(network, Network):
+            return None
         if not isinstance(method, InvertedSettings):
             return getattr(method, "n_corrections", 1) * forward_operations(network)
         step = STEPS[method.inversion.kind](network, len(network.inputs) - 1)
@@ -257,7 +271,7 @@ def read(section: Section) -> Results:
             for name, network in networks.items()
             if network.is_selected
         },
-        trained={name: load_network(data / f"networks/{name}.json")[0] for name in networks},
+        trained={name: section.load_of(name)(section.file_of(name))[0][0] for name in networks},
         tolerances=read_table(data / "studies/tolerance.parquet"),
         fitting=read_table(data / "studies/fitting.parquet"),
         by_corrections=read_table(data / "studies/corrections.parquet"),
@@ -268,6 +282,7 @@ def read(section: Section) -> Results:
         ),
         shape=read_json(data / "studies/shape.json")
         | {"exaggeration": section.studies.shape.exaggeration},
+        curves=learning_curves.read(section, section.studies.learning_curves),
     )
 
 

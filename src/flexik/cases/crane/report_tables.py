@@ -8,7 +8,7 @@ from flexik.cases.crane.report_results import KIND, Results
 from flexik.learning.size_rules import haykin, haykin_samples, oja
 from flexik.planar.learning import learnt_rows
 from flexik.positioning.inverted_network import InvertedSettings
-from flexik.reporting import style
+from flexik.reporting import curves, style
 from flexik.reporting.style import MM
 from flexik.reporting.tables import Column, Table, mm, spread, table
 
@@ -125,6 +125,7 @@ def tables(results: Results) -> dict[str, Table]:
         "mesh_study": table(results.mesh, MESH),
         "training": Table(training, {"training error": 4, "selection error": 4}),
         "training_race": _race(results.training_curves),
+        **({"learning_curves": curves.table(results.curves)} if len(results.curves) else {}),
         "size_rules": Table(_size_rules(results), 0),
         **{f"size_selection/{k}": table(sizes, SIZES) for k, (sizes, _) in results.studies.items()},
     }

@@ -22,7 +22,14 @@ from flexik.parameters.model import (
     Vector,
 )
 from flexik.planar import section as planar
-from flexik.planar.section import SAME, CorrectionStudy, PlanarSection
+from flexik.planar.section import (
+    SAME,
+    CorrectionStudy,
+    LearningCurves,
+    PlanarNetwork,
+    PlanarSection,
+    check_curves,
+)
 from flexik.positioning.combined import Settings as Combined
 from flexik.positioning.inverted_network import InvertedSettings
 
@@ -128,6 +135,7 @@ class Studies(Model):
     shape: Shape
     fitting: Fitting
     tolerance: ToleranceStudy
+    learning_curves: LearningCurves | None = None
     measured: Measured
 
 
@@ -160,6 +168,7 @@ class Section(PlanarSection):
         self._check_shape()
         self._check_fitting()
         self._check_methods()
+        check_curves(self, self.studies.learning_curves)
         for name, kind in (("published", Points), ("workspace", RandomTargets)):
             if not isinstance(self.conditions.get(name), kind):
                 raise ValueError(f"conditions.{name}: expected {kind.__name__}, which is reported")
@@ -206,11 +215,15 @@ class Section(PlanarSection):
         }
         for key, (name, kind) in needed.items():
             known = [other for other, given in self.methods.items() if isinstance(given, kind)]
+            known = [n for n in known if isinstance(self._network_of(n), PlanarNetwork)]
             if name not in known:
                 raise ValueError(
                     f"studies.{key}: {name!r} is none of the methods that serve, "
                     f"{', '.join(known) or 'of which there is none'}"
                 )
+
+    def _network_of(self, method: str) -> object:
+        return self.networks.get(self.methods[method].network or "")
 
 
 def check(section: Section) -> None:

@@ -13,15 +13,14 @@ from flexik.datasets.tables import read_table
 from flexik.evaluation.errors import workspace_statistics
 from flexik.files import read_json
 from flexik.kinematics.status import REACHED
-from flexik.learning.storage import load_network
 from flexik.machines.bodies import Beam
 from flexik.parameters.conditions import RandomTargets
-from flexik.planar import held_out
+from flexik.planar import held_out, learning_curves
 from flexik.planar.fields import deflection
 from flexik.planar.picture import moved, picture
 from flexik.planar.samples import counts
 from flexik.planar.section import OwnSamples
-from flexik.reporting import kinds, plane, style
+from flexik.reporting import curves, kinds, plane, style
 from flexik.reporting.chart import Axis
 from flexik.reporting.report import Content, Drawing, draw, write_case
 from flexik.reporting.style import MM
@@ -70,7 +69,7 @@ class Results:
                 {
                     "network": name,
                     "learns": network.learns or f"what {network.corrects} lacks",
-                    "hidden": len(load_network(folder / f"{name}.json")[0].weights[0]),
+                    "hidden": restarts["n_hidden"].iloc[0],
                     "restarts": len(restarts),
                     "trainer": network.trainer,
                     "least": found.min(),
@@ -98,6 +97,11 @@ class Results:
         folder = self.section.data / "samples"
         names = ["grid", "selection", *(["held_out"] if self.held_out else [])]
         return {name: read_table(folder / f"{name}.parquet") for name in names}
+
+    @cached_property
+    def curves(self) -> pd.DataFrame:
+        """Errors by number of samples, of planar.learning_curves."""
+        return learning_curves.read(self.section, self.section.studies.learning_curves)
 
     @cached_property
     def shape(self) -> dict[str, Any]:
@@ -133,6 +137,8 @@ def tables(results: Results) -> dict[str, Table]:
     errors = {name: Column(name, 6) for name in ("least", "median", "largest")}
     told = ("network", "learns", "hidden", "restarts", "trainer")
     found["networks"] = table(results.networks, {name: name for name in told} | errors)
+    if len(results.curves):
+        found["learning_curves"] = curves.table(results.curves)
     return found | {"bodies": _bodies(results.section), "drives": _drives(results.section)}
 
 
@@ -198,6 +204,8 @@ def figures(results: Results) -> dict[str, Drawing]:
                 scale=MM,
                 cell=round(side, 2) or None,
             )
+    if len(results.curves):
+        found["learning_curves"] = curves.figure(results.curves)
     if results.held_out:
         frame = pd.concat([f.assign(method=m) for m, f in results.held_out.items()])
         axis = Axis("distance (mm)", MM, log=True)

@@ -10,7 +10,13 @@ from flexik.parameters.conditions import ConditionSet
 from flexik.parameters.model import Model, Name, NotNegative
 from flexik.planar import section as planar
 from flexik.planar.own_samples import read_own
-from flexik.planar.section import AnySamples, OwnSamples, PlanarSection
+from flexik.planar.section import (
+    AnySamples,
+    LearningCurves,
+    OwnSamples,
+    PlanarSection,
+    check_curves,
+)
 from flexik.positioning.registry import Methods
 
 
@@ -30,9 +36,11 @@ class Studies(Model):
 
     picture : sample that is drawn; not given: all drives in the middle of their limits, the largest
         payload of the grid.
+    learning_curves : errors by number of samples; not given: none.
     """
 
     picture: Picture | None = None
+    learning_curves: LearningCurves | None = None
 
 
 class Section(PlanarSection):
@@ -66,6 +74,7 @@ class Section(PlanarSection):
                 raise ValueError(
                     f"networks.{name}.learns: coordinates need a machine of two drives"
                 )
+        check_curves(self, self.studies.learning_curves)
         shown = self.studies.picture
         if shown is not None and len(shown.values) != len(self.machine.drives):
             raise ValueError(f"studies.picture.values: expected {len(self.machine.drives)} of them")

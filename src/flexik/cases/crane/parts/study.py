@@ -4,7 +4,7 @@ from flexik.cases.crane.parts import fitting, mesh, points, tolerance
 from flexik.cases.crane.parts.measured.parts import measured_parts
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part
-from flexik.planar import corrections, shape
+from flexik.planar import corrections, learning_curves, shape
 
 
 def parts(section: Section) -> list[Part]:
@@ -13,4 +13,5 @@ def parts(section: Section) -> list[Part]:
     drawn = shape.part(section, shown.strokes, shown.payload)
     nominal = [study.part(section) for study in (mesh, fitting, tolerance, points)]
     nominal.append(corrections.part(section, section.studies.corrections))
-    return [drawn, *nominal, *measured_parts(section)]
+    curves = learning_curves.parts(section, section.studies.learning_curves)
+    return [drawn, *nominal, *curves, *measured_parts(section)]

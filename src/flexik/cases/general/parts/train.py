@@ -1,5 +1,5 @@
 """Networks from several starts; the selection set chooses among them."""
 
-from flexik.planar.train import parts
+from flexik.planar.learners import parts
 
 __all__ = ["parts"]

@@ -1,0 +1,44 @@
+"""Table and figure of planar.learning_curves: errors against samples and payload levels."""
+
+import numpy as np
+import pandas as pd
+
+from flexik.reporting import chart as charts
+from flexik.reporting import style
+from flexik.reporting.chart import Axis, Layer
+from flexik.reporting.report import Drawing, draw
+from flexik.reporting.style import MM
+from flexik.reporting.tables import Table
+
+KEYS = ["network", "design", "n_samples", "n_levels"]
+TITLES = {"random": "random samples", "levels": "poses of the grid, fewer payloads"}
+
+
+def table(curves: pd.DataFrame) -> Table:
+    """A row for each network and set that it learnt from; errors in mm."""
+    inside = curves[curves["payload"].isna()].set_index(KEYS)
+    names = {"mean_error": "mean (mm)", "p99_error": "99 % (mm)", "max_error": "max (mm)"}
+    found = MM * inside[list(names)].rename(columns=names)
+    for payload, rows in curves[curves["payload"].notna()].groupby("payload"):
+        found[f"mean at {payload:g} kg (mm)"] = MM * rows.set_index(KEYS)["mean_error"]
+    frame = found.reset_index().rename(
+        columns={"design": "learnt from", "n_samples": "samples", "n_levels": "payloads"}
+    )
+    frame["learnt from"] = frame["learnt from"].map(TITLES)
+    frame["payloads"] = [str(n) if n else "random" for n in frame["payloads"]]
+    return Table(frame, dict.fromkeys(found.columns, 3))
+
+
+def figure(curves: pd.DataFrame) -> Drawing:
+    """Mean error against the number of samples, a panel a design."""
+    inside = curves[curves["payload"].isna() & np.isfinite(curves["mean_error"])]
+    return draw(
+        charts.chart,
+        Layer(inside, "n_samples", "mean_error", "o-", "network"),
+        x=Axis("samples (1)", log=True),
+        y=Axis("mean error of the predicted tip (mm)", MM, log=True),
+        panel="design",
+        titles=TITLES,
+        looks=style.looks(curves["network"].unique()),
+        height=5.0,
+    )
