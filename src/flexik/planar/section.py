@@ -1,6 +1,5 @@
 """The section of a planar flexible machine in params.yaml."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -12,9 +11,11 @@ from flexik.kinematics.machine_file import check_machine, manipulator_of
 from flexik.kinematics.manipulator import Manipulator
 from flexik.machines.planar import PlanarMachine
 from flexik.parameters.conditions import ConditionSet, Points
-from flexik.parameters.model import Count, Model, Name, NotNegative, Seed, Share
+from flexik.parameters.model import Count, Model, Name, NotNegative, Positive, Seed, Share
 from flexik.parameters.networks import Axis, Network, check_networks
 from flexik.parameters.section import CaseSection
+from flexik.planar.measured.campaign_file import own_campaign
+from flexik.planar.measured.section import Measured
 from flexik.positioning.registry import Methods, check_methods
 
 Part = Annotated[float, Field(gt=0, lt=1)]
@@ -85,8 +86,49 @@ class PlanarNetwork(Network):
     learns: Literal["deflection", "tip", "rigid_tip", "coordinates"] | None = None
 
 
+class Calibration(Model):
+    """Constants of the machine that are free, by their dotted key in its file, SI units.
+
+    known : as somebody knows them.
+    ranges : of those that are fitted: one to `mean_error` (m) of the rigid inverse alone over
+        `conditions`, points or a name of params.yaml, or one and more to the tips of `campaign`, a
+        file with coordinates, see planar.measured.campaign_file.
+    """
+
+    known: dict[str, Positive] = Field(default_factory=dict)
+    ranges: dict[str, tuple[Positive, Positive]] = Field(default_factory=dict)
+    mean_error: Positive | None = None
+    conditions: Points | Name | None = None
+    campaign: str | None = None
+
+    @model_validator(mode="after")
+    def _fits_something(self) -> Self:
+        for key, (low, high) in self.ranges.items():
+            if not low < high:
+                raise ValueError(f"ranges.{key}: must increase")
+        to_error = self.mean_error is not None
+        if self.ranges and to_error == (self.campaign is not None):
+            raise ValueError("mean_error: expected it, with conditions, or else campaign")
+        if self.ranges and to_error and (self.conditions is None or len(self.ranges) > 1):
+            raise ValueError("mean_error: expected conditions for it, and one of ranges")
+        return self
+
+    def check_keys(self, machine: PlanarMachine) -> None:
+        """Raise ValueError unless exactly what is free in `machine` is known or fitted."""
+        for key in machine.free:
+            if (key in self.known) == (key in self.ranges):
+                raise ValueError(
+                    f"machine.{key}: expected a value, or it once in calibration, known or ranges"
+                )
+        for key in (*self.known, *self.ranges):
+            if key not in machine.free:
+                raise ValueError(f"machine.{key}: expected fit, for calibration tells it")
+
+
 class PlanarSection(CaseSection):
     """A planar flexible machine."""
+
+    calibration: Calibration = Calibration()  # type: ignore[assignment]
 
     machine: PlanarMachine
     samples: Samples
@@ -106,13 +148,37 @@ class PlanarSection(CaseSection):
 
     @property
     def files(self) -> list[Path]:
-        """Section tables, and samples of the user's own."""
+        """Section tables, and samples and campaigns of the user's own."""
         own = [self.samples.file] if isinstance(self.samples, OwnSamples) else []
+        own += [self.calibration.campaign] if self.calibration.campaign else []
+        own += (
+            [self.measured.campaign.file] if self.measured and self.measured.campaign.file else []
+        )
         return [Path(file) for file in (*self.machine.section_files.values(), *own)]
+
+    @property
+    def measured(self) -> Measured | None:
+        """Studies of a measured machine, if there are some."""
+        return None
+
+    @property
+    def calibration_points(self) -> Points | None:
+        """Conditions of the mean error that is fitted, if one is."""
+        found = self.calibration.conditions
+        if not isinstance(found, str):
+            return found
+        named = self.conditions.get(found)
+        if not isinstance(named, Points):
+            raise ValueError(f"calibration.conditions: there are no points {found!r}")
+        return named
 
     @model_validator(mode="after")
     def _fits_its_machine(self) -> Self:
         self._check_grid()
+        self.calibration.check_keys(self.machine)
+        self.calibration_points  # noqa: B018  a wrong name shows at once
+        if self.measured is not None:
+            self.measured.check_methods(self.methods)
         check_networks(self.networks, self.trainers)
         for name, network in self.networks.items():
             if network.corrects and self.networks[network.corrects].learns != "rigid_tip":
@@ -145,17 +211,26 @@ class PlanarSection(CaseSection):
             raise ValueError(f"samples.grid: {n_samples:.3g} samples, at most {MOST_SAMPLES:.0g}")
 
 
-def check(section: PlanarSection, others: Mapping[str, Any] | None = None) -> None:
-    """The machine is one, and targets are reached: those of conditions, and `others` by key.
+def check(section: PlanarSection) -> None:
+    """The machine is one, targets are reached, campaigns of the user's own can be read.
 
-    Raises ParameterError naming the key.
+    Raises ParameterError naming the key, or DataError naming file and line.
     """
     try:
         check_machine(section.machine)
     except ValueError as error:
         raise ParameterError(f"{section.machine_file}: {error}") from None
+    sets: dict[str, Any]
     sets = {f"conditions.{name}": given for name, given in section.conditions.items()}
-    for key, given in (sets | dict(others or {})).items():
+    if isinstance(section.calibration.conditions, Points):
+        sets["calibration.conditions"] = section.calibration.conditions
+    if (measured := section.measured) is not None:
+        sets["studies.measured.campaign"] = measured.campaign
+        sets["studies.measured.adaptation"] = measured.adaptation
+    for file in (section.calibration.campaign, measured and measured.campaign.file):
+        if file:
+            own_campaign(file, section.machine)
+    for key, given in sets.items():
         if isinstance(given, Points):
             points = np.array(given.points)
             missed = np.flatnonzero(~_reached(section, points))

@@ -1,21 +1,20 @@
 """The section `crane` of params.yaml."""
 
 import math
-from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from flexik.cases.crane.measured_section import Measured
-from flexik.cases.crane.parts.measured.campaign_file import own_campaign
 from flexik.kinematics.crane import CraneGeometry
 from flexik.kinematics.machine_file import crane_geometry
 from flexik.parameters.conditions import Points, RandomTargets, check_different
 from flexik.parameters.model import Count, Model, Name, NotNegative, Positive, Seed
 from flexik.planar import section as planar
-from flexik.planar.section import SAME, PlanarSection
-from flexik.positioning.combined import Settings as Combined
+from flexik.planar.measured.section import Measured
+from flexik.planar.section import SAME, PlanarSection, check
 from flexik.positioning.inverted_network import InvertedSettings
+
+__all__ = ["Section", "check"]
 
 # The one free constant of the machine file
 SPRING = "joints.slew.springs.torsion"
@@ -32,21 +31,10 @@ PUBLISHED = Points(
 )
 
 
-class Calibration(Model):
-    """The ground spring: known, `stiffness` in N m/rad, or fitted between those of the range.
+class Calibration(planar.Calibration):
+    """Of the ground spring; conditions: what the published mean error belongs to."""
 
-    conditions : what the published mean error without compensation belongs to.
-    """
-
-    stiffness: Positive | None = None
-    stiffness_range: tuple[Positive, Positive] = (1e6, 1e9)
-    conditions: Points = PUBLISHED
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        if self.stiffness_range[0] >= self.stiffness_range[1]:
-            raise ValueError("stiffness_range: must increase")
-        return self
+    conditions: Points | Name = PUBLISHED
 
 
 class MeshStudy(Model):
@@ -109,7 +97,7 @@ class Studies(Model):
 class Section(PlanarSection):
     """The log crane."""
 
-    calibration: Calibration = Calibration()  # type: ignore[assignment]
+    calibration: Calibration
     studies: Studies
 
     @property
@@ -118,10 +106,9 @@ class Section(PlanarSection):
         return crane_geometry(self.machine)
 
     @property
-    def files(self) -> list[Path]:
-        """Section tables, and a campaign of the user's own."""
-        own = self.studies.measured.campaign.file
-        return super().files + ([] if own is None else [Path(own)])
+    def measured(self) -> Measured:
+        """Studies of the measured crane."""
+        return self.studies.measured
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -130,7 +117,7 @@ class Section(PlanarSection):
         if self.machine.free != [SPRING]:
             raise ValueError(
                 f"machine.{SPRING}: expected fit, and a value for everything else; a known value "
-                "stands under calibration.stiffness"
+                "stands under calibration.known"
             )
         self._check_shape()
         self._check_fitting()
@@ -166,9 +153,6 @@ class Section(PlanarSection):
         needed = {
             f"tolerance.methods.{number}": (name, InvertedSettings)
             for number, name in enumerate(self.studies.tolerance.methods)
-        } | {
-            f"measured.{key}.method": (name, Combined)
-            for key, name in self.studies.measured.methods.items()
         }
         for key, (name, kind) in needed.items():
             known = [other for other, given in self.methods.items() if isinstance(given, kind)]
@@ -177,19 +161,3 @@ class Section(PlanarSection):
                     f"studies.{key}: {name!r} is none of the methods that serve, "
                     f"{', '.join(known) or 'of which there is none'}"
                 )
-
-
-def check(section: Section) -> None:
-    """The machine is one, targets are reached, a campaign of the user's own can be read.
-
-    Raises ParameterError naming the key.
-    """
-    measured = section.studies.measured
-    others = {
-        "calibration.conditions": section.calibration.conditions,
-        "studies.measured.campaign": measured.campaign,
-        "studies.measured.adaptation": measured.adaptation,
-    }
-    planar.check(section, others)
-    if measured.campaign.file is not None:
-        own_campaign(measured.campaign.file, section.geometry)

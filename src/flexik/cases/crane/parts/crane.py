@@ -1,12 +1,10 @@
 """The flexible crane that the pipeline has calibrated, for parts that put it into equilibrium."""
 
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
-from flexik.cases.crane.section import SPRING
 from flexik.kinematics.crane import CraneGeometry
-from flexik.kinematics.machine_file import crane_geometry, with_geometry
+from flexik.kinematics.machine_file import crane_geometry
 from flexik.machines.planar import PlanarMachine
 from flexik.multibody.flexible import FlexibleMachine
 from flexik.planar.machine import known
@@ -20,17 +18,7 @@ class FlexibleCrane(FlexibleMachine):
         """Its dimensions."""
         return crane_geometry(self.machine)
 
-    def like(self, geometry: CraneGeometry) -> "FlexibleCrane":
-        """The same with the dimensions `geometry`, a little off its own."""
-        machine = with_geometry(self.machine, geometry)
-        return replace(self, machine=machine, near=self.linkage)
-
 
 def flexible(machine: PlanarMachine, constants: Path) -> FlexibleCrane:
     """The crane `machine` on the ground spring of the file `constants`."""
     return FlexibleCrane(known(machine, constants))
-
-
-def on_spring(machine: PlanarMachine, stiffness: float) -> FlexibleCrane:
-    """The crane `machine` on a ground spring of `stiffness` N m/rad."""
-    return FlexibleCrane(machine.with_constants({SPRING: stiffness}))

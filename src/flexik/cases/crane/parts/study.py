@@ -1,10 +1,10 @@
 """What varies one thing: mesh, shape, size of a network, tolerance, and the crane as built."""
 
 from flexik.cases.crane.parts import fitting, mesh, tolerance
-from flexik.cases.crane.parts.measured.parts import measured_parts
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part
 from flexik.planar import shape
+from flexik.planar.measured.parts import measured_parts
 
 
 def parts(section: Section) -> list[Part]:
@@ -12,4 +12,4 @@ def parts(section: Section) -> list[Part]:
     shown = section.studies.shape
     drawn = shape.part(section, shown.strokes, shown.payload)
     nominal = [study.part(section) for study in (mesh, fitting, tolerance)]
-    return [drawn, *nominal, *measured_parts(section)]
+    return [drawn, *nominal, *measured_parts(section, section.studies.measured)]

@@ -1,10 +1,11 @@
-"""The measured crane: its stand-in, the campaign, and what is learnt from measurements."""
+"""A measured machine: its stand-in, the campaign, and what is learnt from measurements."""
 
+from collections.abc import Mapping
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from flexik.machines.deviations import Clearance, Length, Magnitudes, Relative
+from flexik.machines.deviations import Expected, Length, Magnitudes
 from flexik.parameters.conditions import Points
 from flexik.parameters.model import (
     Count,
@@ -15,22 +16,22 @@ from flexik.parameters.model import (
     Seed,
     check_increase,
 )
-
-Known = Field(gt=0)  # an expectation of zero would leave nothing to identify
+from flexik.positioning.combined import Settings as Combined
+from flexik.positioning.method import Settings
 
 
 class Campaign(Points):
-    """Every point with every payload, without and with compensation, on a crane as built.
+    """Every point with every payload, without and with compensation, on a machine as built.
 
-    file : a CSV of one's own takes its place, see parts.measured.campaign_file; None: there is none
-    method : compensates; of kind combined, of the nominal crane
+    file : a CSV of one's own takes its place, see planar.measured.campaign_file
+    method : compensates; of kind combined, of the nominal machine
     noise : standard deviation of a measured coordinate, m
     """
 
     file: str | None = None
     method: Name = "combined"
-    noise: Length
-    deviations: Magnitudes
+    noise: Length = 0.5e-3
+    deviations: Magnitudes = Magnitudes()
     seed: Seed = 1
 
     @model_validator(mode="after")
@@ -43,24 +44,10 @@ class Campaign(Points):
 
 
 class Budget(Model):
-    """The campaign on cranes with one kind of deviation, or `factor` times as much of it."""
+    """The campaign on machines with one kind of deviation, or `factor` times as much of it."""
 
-    n_cranes: Count
+    n_twins: Count
     factor: Annotated[float, Field(gt=1, le=10)]
-
-
-class Expected(Model):
-    """What an adaptation expects before measuring, see parts.measured.adapted."""
-
-    measurement: Annotated[Length, Known]
-    repeatability: Clearance
-    pivot: Annotated[Length, Known]
-    length: Annotated[Length, Known]
-    stroke_offset: Annotated[Length, Known]
-    play: Clearance
-    play_deviation: Annotated[Clearance, Known]
-    section: Annotated[Relative, Known]
-    spring: Annotated[Relative, Known]
 
 
 class Misjudged(Model):
@@ -71,18 +58,18 @@ class Misjudged(Model):
 
 
 class Adaptation(Model):
-    """Cranes that are adapted, measurements for it, and targets to judge by."""
+    """Machines (n_twins) that are adapted, measurements for it, and targets to judge by."""
 
     method: Name
-    n_cranes: Count
+    n_twins: Count
     n_measurements: Annotated[list[Annotated[int, Field(ge=3)]], Field(min_length=1)]
     n_targets: Count
     x: Interval
     y: Interval
     payload: tuple[NotNegative, NotNegative]
-    n_corrections: Count
-    expected: Expected
-    misjudged: Misjudged
+    n_corrections: Count = 3
+    expected: Expected = Expected()
+    misjudged: Misjudged | None = None
     seed: Seed = 100
 
     @model_validator(mode="after")
@@ -92,20 +79,30 @@ class Adaptation(Model):
             raise ValueError("payload: must not decrease")
         if self.n_measurements != sorted(set(self.n_measurements)):
             raise ValueError("n_measurements: must increase")
-        for number in self.misjudged.n_measurements:
+        for number in self.misjudged.n_measurements if self.misjudged else ():
             if number not in self.n_measurements:
                 raise ValueError(f"misjudged.n_measurements: {number} is not in n_measurements")
         return self
 
 
 class Measured(Model):
-    """Studies of the measured crane (chapter 4.6)."""
+    """Studies of a measured machine (Rouvinen 1999, chapter 4.6); budget: None: there is none."""
 
     campaign: Campaign
-    budget: Budget
+    budget: Budget | None = None
     adaptation: Adaptation
 
     @property
     def methods(self) -> dict[str, str]:
         """Methods of kind combined that it names, by key."""
         return {"campaign": self.campaign.method, "adaptation": self.adaptation.method}
+
+    def check_methods(self, methods: Mapping[str, Settings]) -> None:
+        """Raise ValueError unless those that it names are among `methods`, of kind combined."""
+        known = [name for name, given in methods.items() if isinstance(given, Combined)]
+        for key, name in self.methods.items():
+            if name not in known:
+                raise ValueError(
+                    f"studies.measured.{key}.method: {name!r} is none of the methods that serve, "
+                    f"{', '.join(known) or 'of which there is none'}"
+                )
