@@ -33,8 +33,8 @@ from flexik.kinematics.crane import forward
 from flexik.kinematics.manipulator import Array
 from flexik.multibody.model import PlanarModel
 from flexik.parameters.networks import Axis
+from flexik.planar.constants import model_inputs
 from flexik.planar.fields import sample_fields
-from flexik.planar.machine import model_inputs
 from flexik.planar.samples import axis, counts, parts
 
 # Values on the axes: 4050 vectors as in table 4.1, ten times and 100 times as many

@@ -39,7 +39,12 @@ def crane_lesson(network: str) -> Lesson:
     section = load("crane")
     architecture = Architecture(1, ACTIVATION)
     return lesson(
-        NETWORKS[network], architecture, OURS(), SEED, section.machine, **data_inputs(section)
+        NETWORKS[network],
+        architecture,
+        OURS(),
+        SEED,
+        section.machine,
+        **data_inputs(section, network),
     )
 
 

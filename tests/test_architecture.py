@@ -25,6 +25,7 @@ SHARED = {
     "parameters": {"errors", "files"},
     "stage": {"errors", "kernels", "cases", "datasets"},
     "__main__": {"kernels", "stage", "commands"},
+    "docs": {"files", "parameters", "machines", "planar", "reporting", "cases"},
     "commands": {
         *(
             "errors",

@@ -7,9 +7,16 @@ from pathlib import Path
 import pytest
 import yaml
 
+from flexik import docs
 from flexik.cases import case as cases
 from flexik.errors import ParameterError
+from flexik.machines.bodies import Beam
+from flexik.machines.planar import PlanarMachine
+from flexik.parameters import describe
+from flexik.parameters.conditions import Points
 from flexik.parameters.reading import overlay, read_yaml
+from flexik.parameters.trainers import Trainer
+from flexik.planar.section import PlanarNetwork, Samples
 
 ROOT = Path(__file__).parents[1]
 FILES = [ROOT / "params.yaml", *sorted((ROOT / "data/machines").glob("*.yaml"))]
@@ -216,6 +223,14 @@ WRONG = [
     ("excavator.samples.grid.payload.increment", 1.0e-3),
     ("excavator.samples.selection.payload", [-5.0, 3000.0]),
     ("excavator.conditions.workspace.x", [50.0, 60.0]),
+    ("excavator.conditions.workspace.x", [8.0, 30.0]),  # a hundredth of it is reached
+    ("excavator.conditions.workspace.payload", [0.0, 3.0]),
+    ("excavator.conditions.workspace.payload", [0.0, 9.0e3]),
+    ("excavator.conditions.workspace.n_targets", 10**12),
+    ("excavator.samples.grid.payload", {"minimum": 0.0, "maximum": 3.0, "increment": 1.0}),
+    ("excavator.samples.grid.payload", {"minimum": 0.0, "maximum": 3.0e5, "increment": 1.0e5}),
+    ("excavator.networks.deflection.n_restarts", 10**9),
+    ("excavator.networks.deflection.n_hidden", 10**6),
     ("excavator.studies", {"picture": {"values": [0.5], "payload": 100.0}}),
     ("fanuc.machine.joints.4.d", 0.1),
     ("fanuc.machine.joints.0.alpha", 1.0),
@@ -242,7 +257,7 @@ def test_a_mistake_is_one_line_that_names_file_and_key(changed, key, value):
         changed(key, value)
     (line,) = str(raised.value).splitlines()
     file, named, message = line.split(": ", 2)
-    assert message
+    assert message and "nput should" not in message  # pydantic's words
     case, _, within = key.partition(".machine.")
     assert file == (f"data/machines/{case}.yaml" if within else "params.yaml")
     # a value that does not fit is told at the key, at an entry of it or at what holds it
@@ -285,7 +300,10 @@ def test_names_are_plain_words(changed, original, section, name):
         (f"{INVERSION}.kind", "newton", "gradient_descent"),
         ("trainers.study.kind", "simplex", "back_propagation"),
         (f"{BEAMS}.lift.mass", -124.6, "-124.6"),
-        (f"{GRID}.jib.increment", 0.1, "whole number"),
+        (f"{GRID}.jib.increment", 0.1, "0.1 makes 7.8; 0.0975 would do"),
+        (f"{GRID}.jib.maximum", 0.975, "expected 0.78 or less, got 0.975"),
+        (f"{DEFLECTION}.n_restart", 5, "did you mean n_restarts? (known: learns, corrects"),
+        ("excavator.samples.grid.payload.maximum", 3.0e5, "(300000 g would be 300)"),
     ],
 )
 def test_a_wrong_value_comes_with_what_would_do(changed, key, value, known):
@@ -340,6 +358,28 @@ def test_overlay_replaces_leaves_and_leaves_the_rest():
     }
     assert base == before
     assert overlay(base, {}) == base
+
+
+def test_docs_are_those_of_the_models():
+    """`dvc repro readme` renews them."""
+    for name, text in docs.pages().items():
+        assert (ROOT / "docs" / name).read_text() == text, name
+    kinds = {"kind", "method"}  # told below the heading
+    for model in describe.models_in(PlanarMachine, Samples, Points, PlanarNetwork, Trainer):
+        bare = [key.name for key in describe.keys(model) if not key.text and key.name not in kinds]
+        assert not bare, model
+
+
+def test_docs_tell_units_ranges_and_defaults():
+    beam = {key.name: key for key in describe.keys(Beam)}
+    assert beam["youngs_modulus"].takes == "number, more than 0, Pa (1e+08 to 2e+12)"
+    assert beam["mass_span"].takes == "list of 2: number, m (up to 100)"
+    assert (
+        beam["section"].takes
+        == "[table](#table) or [box](#box) or [tube](#tube) or [solid](#solid)"
+    )
+    assert (beam["poisson"].default, beam["axis"].default) == ("0.3", "")
+    assert beam["angle"].text.startswith("of its frame")  # of the class that all bodies share
 
 
 def mappings(data):

@@ -33,6 +33,9 @@ def test_a_new_machine_is_a_case_like_its_model(project, like):
     assert after["cases"].pop("digger") == {"code": "general"}
     assert after == before
     section, model = cases.load("digger"), cases.load(like)
+    text = (project / "data/machines/digger.yaml").read_text()
+    assert "[x]" not in text and "assumed" not in text  # what is true of the model alone
+    assert "youngs_modulus: 210.0e+9  # Pa\n" in text  # what the keys of the model are
     assert section.machine.title == f"digger (begun as {like})"
     assert section.machine.bodies == model.machine.bodies
     cases.check(section)

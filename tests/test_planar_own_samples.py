@@ -1,6 +1,7 @@
 """Samples of one's own: units and headers, what is refused, and a case that runs on them."""
 
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -14,7 +15,7 @@ from flexik.datasets.parts import make
 from flexik.datasets.tables import read_table
 from flexik.errors import DataError, ParameterError
 from flexik.machines.planar import read_machine
-from flexik.planar.own_samples import read_own
+from flexik.planar.own_samples import divided, read_own
 from flexik.planar.section import OwnSamples
 
 MACHINE = read_machine(FILES["excavator"])
@@ -62,34 +63,71 @@ def spoiled(column, value, row=3):
     return frame
 
 
+TONNES = r"payload: expected kg, 2\.9\d* is nothing to a machine of 2480 \(2\.9\d* t would be 29"
+
+
 @pytest.mark.parametrize(
     ("frame", "message"),
     [
         (in_other_units(samples()).drop(columns="tip_y m"), "expected a column tip_y with a unit"),
         (in_other_units(samples()).rename(columns={"tip_y m": "tip_y"}), "expected a unit at its"),
         (in_other_units(samples()).rename(columns={"tip_y m": "tip_y kg"}), "one of m, cm, mm"),
-        (spoiled("tip_y m", "high"), "column tip_y m, row 4: expected a number"),
-        (spoiled("tip_y m", np.nan), "column tip_y m, row 4: expected a number"),
-        (spoiled("Boom stroke [mm]", 1500.0), "row 4: boom_stroke 1.5, expected 0 to 1.26"),
-        (spoiled("tip_x (mm)", 15.0), r"row 4: the tip \(0\.015"),
+        (spoiled("tip_y m", "high"), "line 5, column tip_y m: expected a number, got 'high'"),
+        (spoiled("tip_y m", np.nan), "line 5, column tip_y m: expected a number, got nothing"),
+        (spoiled("Boom stroke [mm]", 1500.0), "line 5: boom_stroke: expected 0 to 1.26, got 1.5"),
+        (spoiled("tip_x (mm)", 15.0), r"line 5: the tip \(0\.015"),
+        (
+            in_other_units(samples()).rename(columns={"load on hook (t)": "load on hook (kg)"}),
+            TONNES,
+        ),
+        (spoiled("load on hook (t)", -1.0), "line 5: payload: expected 0 or more"),
     ],
 )
 def test_what_cannot_be_is_named(tmp_path, frame, message):
     path = tmp_path / "mine.csv"
     frame.to_csv(path, index=False)
     with pytest.raises(DataError, match=message) as raised:
-        read_own(path, MACHINE, {"payload": "load on hook (t)"})
+        read_own(path, MACHINE, {"payload": next(name for name in frame if "load" in name)})
     assert str(raised.value).startswith(f"{path}")
     assert "\n" not in str(raised.value)
 
 
 def test_a_column_map_that_names_nothing_and_no_file_are_said(tmp_path):
     path = tmp_path / "mine.csv"
+    with pytest.raises(DataError, match="cannot be read"):
+        read_own(path, MACHINE, {})
+    path.write_text("")
     with pytest.raises(DataError, match="expected a CSV or Parquet table"):
         read_own(path, MACHINE, {})
     in_other_units(samples()).to_csv(path, index=False)
     with pytest.raises(DataError, match=r"expected a column 'load \(kg\)'"):
         read_own(path, MACHINE, {"payload": "load (kg)"})
+
+
+def test_lines_are_those_of_the_file_with_its_blank_ones(tmp_path):
+    path = tmp_path / "mine.csv"
+    spoiled("tip_y m", "high", row=3).to_csv(path, index=False)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([*lines[:2], "", *lines[2:], "", ""]))
+    with pytest.raises(DataError, match="line 6, column tip_y m"):
+        read_own(path, MACHINE, {"payload": "load on hook (t)"})
+    path.write_text("\n".join([*lines[:2], "", *lines[2:4], "", ""]))
+    assert len(read_own(path, MACHINE, {"payload": "load on hook (t)"})) == 3
+
+
+def test_rows_of_one_pose_stay_together():
+    poses = samples(40)
+    frame = poses.loc[poses.index.repeat(5)].reset_index(drop=True)
+    frame["payload"] = np.tile([0.0, 100.0, 200.0, 300.0, 400.0], 40)
+    found = divided(frame, MACHINE, OwnSamples(file="mine.csv"))
+    assert {name: len(rows) for name, rows in found.items()} == {
+        "selection": 40,
+        "held_out": 40,
+        "grid": 120,
+    }
+    assert sorted(np.concatenate([*found.values()])) == list(range(200))
+    strokes = {name: set(frame["boom_stroke"].iloc[rows]) for name, rows in found.items()}
+    assert not strokes["grid"] & (strokes["held_out"] | strokes["selection"])
 
 
 @pytest.fixture
@@ -105,8 +143,6 @@ def section(tmp_path, monkeypatch):
             "deflection": {"learns": "deflection", "n_hidden": 3, "n_restarts": 2},
             "tip": {"learns": "tip", "n_hidden": 6, "n_restarts": 2},
         },
-        "conditions": {},
-        "methods": {"none": {}},
     }
     files = {"params.yaml": given}
     for file in (ROOT / "data/machines").glob("*.yaml"):
@@ -140,9 +176,9 @@ def test_a_case_runs_on_samples_of_its_own(section, tmp_path):
         (
             "conditions",
             {"published": {"points": [[4, 1]], "payloads": [0]}},
-            "conditions: expected",
+            "conditions: expected none",
         ),
-        ("methods", {"none": {}, "combined": {"network": "deflection"}}, "conditions: expected"),
+        ("methods", {"none": {}, "combined": {"network": "deflection"}}, "methods: expected none"),
         ("samples", {"file": "mine.csv", "held_out_share": 0.9}, "leaves nothing to learn from"),
     ],
 )
@@ -150,3 +186,15 @@ def test_what_needs_a_model_says_so(section, key, value, message):
     section[0]["params.yaml"]["excavator"][key] = value
     with pytest.raises(ParameterError, match=message):
         cases.load("excavator")
+
+
+def test_a_check_reads_the_samples_and_names_the_key(section):
+    for spoil, message in (
+        (lambda path: path.write_text("a,b\n1,2\n"), "expected a column boom_stroke with a unit"),
+        (lambda path: path.unlink(), "mine.csv: cannot be read"),
+    ):
+        spoil(Path("mine.csv"))
+        with pytest.raises(ParameterError, match=message) as raised:
+            cases.check(section[1])
+        assert str(raised.value).startswith("params.yaml: excavator.samples.file: mine.csv")
+        assert "\n" not in str(raised.value)

@@ -1,4 +1,4 @@
-"""Statics of machines of a file against beam theory."""
+"""Statics of machines of a file, by Exudyn and by beam theory, against closed forms."""
 
 import numpy as np
 import pytest
@@ -9,6 +9,7 @@ from scipy.integrate import quad
 from flexik.errors import ParameterError, SolverError
 from flexik.kinematics.planar import PlanarManipulator
 from flexik.machines.planar import read_machine
+from flexik.multibody.beam_theory import BeamTheory
 from flexik.multibody.flexible import FlexibleMachine
 from flexik.multibody.planar import solve, tips
 
@@ -47,52 +48,66 @@ def clamped(body, **more):
     )
 
 
-def sag(given, load=10.0, values=None, refinement=1):
+def by_theory(flexible, values, payload):
+    """Tips (n, 2) in m without Exudyn."""
+    bent = BeamTheory(flexible, 6, 24).predict(np.column_stack([values, payload]))
+    return PlanarManipulator(flexible.machine).forward(values) + bent
+
+
+@pytest.fixture(params=[tips, by_theory])
+def solver(request):
+    """What finds tips."""
+    return request.param
+
+
+def sag(solver, given, load=10.0, values=None, refinement=1):
     """How far `load` in kg moves the tip, (2,) in m: what it weighs itself is taken off."""
     flexible = FlexibleMachine(given, refinement)
     n_drives = len(given.drives)
     at = np.tile(np.zeros(n_drives) if values is None else values, (2, 1))
-    unloaded, loaded = tips(flexible, at, np.array([0.0, load]))
+    unloaded, loaded = solver(flexible, at, np.array([0.0, load]))
     return loaded - unloaded
 
 
-def test_cantilever():
-    found = sag(clamped(beam([[0, 0], [2, 0]], a=[0, 0], tip=[2, 0])))
+def test_cantilever(solver):
+    found = sag(solver, clamped(beam([[0, 0], [2, 0]], a=[0, 0], tip=[2, 0])))
     assert found[1] == pytest.approx(-10 * G * 8 / (3 * EI), rel=1e-4)
 
 
-def test_own_weight():
+def test_own_weight(solver):
     given = clamped(beam([[0, 0], [2, 0]], a=[0, 0], tip=[2, 0]))
-    tip = tips(FlexibleMachine(given), np.zeros((1, 1)), np.zeros(1))[0]
+    tip = solver(FlexibleMachine(given), np.zeros((1, 1)), np.zeros(1))[0]
     per_length = 7850 * 0.05 * 0.1 * G
     assert tip[1] == pytest.approx(-per_length * 16 / (8 * EI), rel=0.01)
 
 
-def test_tapered_cantilever_by_the_unit_load():
+def test_tapered_cantilever_by_the_unit_load(solver):
     section = SOLID | {"height": [0.2, 0.05]}
-    found = sag(clamped(beam([[0, 0], [2, 0]], section, 16, a=[0, 0], tip=[2, 0])))
+    found = sag(solver, clamped(beam([[0, 0], [2, 0]], section, 16, a=[0, 0], tip=[2, 0])))
     flexibility = quad(lambda x: (2 - x) ** 2 / (E * 0.05 * (0.2 - 0.075 * x) ** 3 / 12), 0, 2)[0]
     assert found[1] == pytest.approx(-10 * G * flexibility, rel=1e-2)
 
 
-def test_shear_as_by_timoshenko():
+def test_shear_as_by_timoshenko(solver):
     short = beam([[0, 0], [0.4, 0]], a=[0, 0], tip=[0.4, 0]) | {"shear_coefficient": 5 / 6}
     bent = 10 * G * 0.4**3 / (3 * EI)
     sheared = 10 * G * 0.4 / (5 / 6 * E / 2.6 * 0.05 * 0.1)
-    assert sag(clamped(short))[1] == pytest.approx(-bent, rel=1e-4)
-    assert sag(clamped(short, shear="included"))[1] == pytest.approx(-bent - sheared, rel=1e-4)
+    assert sag(solver, clamped(short))[1] == pytest.approx(-bent, rel=1e-4)
+    assert sag(solver, clamped(short, shear="included"))[1] == pytest.approx(
+        -bent - sheared, rel=1e-4
+    )
 
 
-def test_an_axis_with_a_corner():
+def test_an_axis_with_a_corner(solver):
     axis, tip = [[0, 0], [1.5, 0], [1.5, 1.0]], [1.5, 1.0]
-    found = sag(clamped(beam(axis, n_elements=10, a=[0, 0], tip=tip)))
+    found = sag(solver, clamped(beam(axis, n_elements=10, a=[0, 0], tip=tip)))
     # the upright part only turns with the end of the level one, and leans by its own weight
     expected = [10 * G * 1.5**2 / (2 * EI), -10 * G * 1.5**3 / (3 * EI)]
     assert found == pytest.approx(np.array(expected), rel=4e-3)
 
 
 @pytest.mark.parametrize("springs", [{"torsion": 1e5}, {"torsion": 1e5, "x": 1e6, "y": 2e6}])
-def test_a_soft_ground(springs):
+def test_a_soft_ground(solver, springs):
     given = machine(
         {"a": [0, 0]},
         {"post": rigid(a=[0, 0], b=[0, 0.5]), "arm": rigid(b=[0, 0], tip=[2, 0])},
@@ -105,13 +120,15 @@ def test_a_soft_ground(springs):
     )
     turned, sunk = 2 * 10 * G / 1e5, 10 * G / 2e6 if "y" in springs else 0.0
     # small turns, though the arm's own weight has turned it already
-    assert sag(given) == pytest.approx(np.array([0.5 * turned, -2 * turned - sunk]), rel=2e-2)
+    assert sag(solver, given) == pytest.approx(
+        np.array([0.5 * turned, -2 * turned - sunk]), rel=2e-2
+    )
 
 
 @pytest.mark.parametrize(
     ("springs", "sunk"), [({"x": 1e5}, 1e-5), ({"y": 1e5}, 0.0), ({"x": 1e5, "y": 3e5}, 1e-5)]
 )
-def test_springs_have_the_axes_of_the_inner_body(springs, sunk):
+def test_springs_have_the_axes_of_the_inner_body(solver, springs, sunk):
     # which the drive turns until its x is up
     given = machine(
         {"a": [0, 0]},
@@ -121,7 +138,7 @@ def test_springs_have_the_axes_of_the_inner_body(springs, sunk):
         "end.tip",
     )
     soft = given.with_constants({"joints.b.springs": springs})
-    found = sag(soft, values=np.array([np.pi / 2]))
+    found = sag(solver, soft, values=np.array([np.pi / 2]))
     assert found == pytest.approx(np.array([0.0, -10 * G * sunk]), rel=1e-6, abs=1e-9)
 
 
@@ -145,7 +162,7 @@ STIFF = {"kind": "box", "width": 0.3, "height": 0.6, "wall": 0.05}
 
 @pytest.mark.parametrize("inner_bends", [False, True])
 @pytest.mark.parametrize("outer_bends", [False, True])
-def test_pads_move_on_bodies_of_every_kind(inner_bends, outer_bends):
+def test_pads_move_on_bodies_of_every_kind(solver, inner_bends, outer_bends):
     boom, slider = {"a": [0, 0], "front": [2, 0]}, {"rear": [0, 0], "tip": [1.5, 0]}
     given = extended(
         beam([[0, 0], [2, 0]], STIFF, **boom) if inner_bends else rigid(**boom),
@@ -153,11 +170,11 @@ def test_pads_move_on_bodies_of_every_kind(inner_bends, outer_bends):
     )
     values = np.array([[0.0, 0.2], [0.5, 0.7], [-0.3, 1.0]])
     expected = PlanarManipulator(given).forward(values)
-    found = tips(FlexibleMachine(given), values, np.full(3, 0.01))
+    found = solver(FlexibleMachine(given), values, np.full(3, 0.01))
     assert found == pytest.approx(expected, abs=1e-4 if inner_bends or outer_bends else 1e-8)
 
 
-def test_a_four_bar_with_a_flexible_coupler():
+def test_a_four_bar_with_a_flexible_coupler(solver):
     middle = [1.0, 0.0]
     given = machine(
         {"a": [0, 0], "d": [2, 0]},
@@ -175,7 +192,7 @@ def test_a_four_bar_with_a_flexible_coupler():
         {"turn": turning("a", (1.0, 2.2))},
         "coupler.tip",
     )
-    found = sag(given, values=np.array([np.pi / 2]))
+    found = sag(solver, given, values=np.array([np.pi / 2]))
     assert found == pytest.approx(np.array([0.0, -10 * G * 8 / (48 * EI)]), rel=1e-3, abs=1e-8)
 
 
@@ -186,7 +203,7 @@ def below(x, y):
 
 
 @pytest.mark.parametrize("out", [0.4, 0.9])
-def test_a_telescope_on_two_pads(out):
+def test_a_telescope_on_two_pads(solver, out):
     given = extended(
         beam([[0, 0], [2, 0]], a=[0, 0], front=[2, 0]),
         beam([[0, 0], [1.5, 0]], rear=[0, 0], tip=[1.5, 0]),
@@ -196,7 +213,7 @@ def test_a_telescope_on_two_pads(out):
     at = {x: front * below(x, 2.0) + rear * below(x, 2.0 - inside) for x in (2.0, 2.0 - inside)}
     line = at[2.0] + out / inside * (at[2.0] - at[2.0 - inside])
     expected = 10 * G * (line + out**2 * (out + inside) / (3 * EI))
-    assert sag(given, values=np.array([0.0, out]))[1] == pytest.approx(-expected, rel=1e-3)
+    assert sag(solver, given, values=np.array([0.0, out]))[1] == pytest.approx(-expected, rel=1e-3)
 
 
 def test_what_is_rigid_stays_where_kinematics_say():
@@ -233,6 +250,33 @@ def test_four_times_finer_meshes_move_the_tip_little(name, payload, largest):
     fine, failures = solve(shipped(name, 4), values, mass)
     assert not failures
     assert np.abs(fine - tips(shipped(name), values, mass)).max() < largest
+
+
+@pytest.mark.parametrize(
+    ("name", "payload", "largest"),
+    [("crane", 500.0, 1e-5), ("excavator", 3000.0, 1e-5), ("concrete_pump", 300.0, 5e-5)],
+)
+def test_fine_meshes_lead_to_beam_theory(name, payload, largest):
+    values, mass = drawn(shipped(name), 40, payload)
+    bent = BeamTheory(shipped(name), 6, 64).predict(np.column_stack([values, mass]))
+    rigid = PlanarManipulator(shipped(name).machine).forward(values)
+    assert np.abs(rigid + bent - tips(shipped(name, 4), values, mass)).max() < largest
+
+
+def test_beam_theory_of_the_rigid_pose_is_linear_in_the_payload():
+    values, _ = drawn(shipped("crane"), 20, 500.0)
+    with_load = [
+        BeamTheory(shipped("crane")).predict(np.column_stack([values, np.full(20, load)]))
+        for load in (0.0, 250.0, 500.0)
+    ]
+    middle = (with_load[0] + with_load[2]) / 2
+    assert with_load[1] == pytest.approx(middle, abs=1e-7)
+
+
+def test_beam_theory_says_where_a_machine_is_not_put_together():
+    theory = BeamTheory(shipped("excavator"))
+    found = theory.predict(np.array([[0.5, 0.5, 100.0], [5.0, 0.5, 100.0]]))
+    assert np.isfinite(found).all(axis=1).tolist() == [True, False]
 
 
 def test_payloads_far_beyond_those_of_the_crane_have_an_equilibrium():

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from elastic_arm import GEOMETRY as ARM
+from planar_machines import FILES, ROOT
 from pydantic import TypeAdapter, ValidationError
 
 from flexik.evaluation.conditions import every
@@ -16,6 +17,7 @@ from flexik.kinematics.crane import inverse, smallest_extension
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.status import NOT_CONVERGED, REACHED, STATUS_MEANING
 from flexik.learning.perceptron import Network, Normalisation, Quantity
+from flexik.machines.planar import read_machine
 from flexik.parameters.networks import Network as NetworkModel
 from flexik.positioning.combined import Combined
 from flexik.positioning.genetic import Genetic, GeneticManipulator
@@ -106,6 +108,11 @@ def network_for(needs, manipulator):
     return {
         None: None,
         "deflection": Sag(manipulator, 0.02),
+        "remainder": Sag(manipulator, 1e-4),
+        "payload_linear": Constant((0.0, -0.01, 0.0, -0.02)),
+        "payload_quadratic": Constant((0.0, -0.01, 0.0, -0.02, 0.0, -0.03)),
+        "target_shift": Constant((0.001, 0.01)),
+        "stroke_shift": Constant((0.001, -0.001)),
         "tip": perceptron(manipulator),
         "correction": perceptron(manipulator),
         "coordinates": RigidInverse(manipulator, 2),
@@ -128,13 +135,21 @@ class Asked:
     answer: Answer
 
 
+def machine_of(name):
+    """A machine of a file, its ground spring known."""
+    found = read_machine(FILES[name].relative_to(ROOT))
+    return found.with_constants(dict.fromkeys(found.free, 8.5e6))
+
+
 @pytest.fixture(params=["crane", "arm"])
-def asked(crane, name, request):
+def asked(crane, name, request, monkeypatch):
+    monkeypatch.chdir(ROOT)
     manipulator = {"crane": crane, "arm": ARM}[request.param]
+    machine = machine_of({"crane": "crane", "arm": "elastic_arm"}[request.param])
     low, high = manipulator.lower, manipulator.upper
     generator = np.random.default_rng(5)
     inside = low + generator.uniform(0.55, 0.75, (20, len(low))) * (high - low)
-    payload = generator.uniform(0.0, 100.0, 20)
+    payload = generator.uniform(0.0, 100.0 if len(low) > 2 else 2.0, 20)
     chosen, tip = settings(name), manipulator.forward(inside)
     axes = [*(np.linspace(*ends, 4) for ends in zip(low, high, strict=True)), [0.0, 100.0]]
     grid = np.column_stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")])
@@ -149,7 +164,7 @@ def asked(crane, name, request):
     query[3, :2] = 50.0
     current = inside + 0.01 * (high - low)
     before = query.copy(), current.copy()
-    method = build_of(chosen)(chosen, Ingredients(manipulator, network, samples))
+    method = build_of(chosen)(chosen, Ingredients(manipulator, network, samples, machine))
     answer = method(query, current)
     assert np.array_equal(query, before[0]) and np.array_equal(current, before[1])
     return Asked(manipulator, network, method, query, current, answer)

@@ -10,6 +10,8 @@ from flexik.kinematics.manipulator import Array
 from flexik.machines.bodies import Point
 from flexik.machines.planar import PlanarMachine
 
+Ends = Point | tuple[Array, Array]
+
 
 @dataclass(frozen=True)
 class Equation:
@@ -20,14 +22,16 @@ class Equation:
         the points) or `line` (distance of the points along `direction` of the first body).
     constant, drive : what angle or distance is, in rad or m; plus a coordinate if there is a drive.
     of : names of the points in the machine file.
+
+    Points, constant and direction may be numbers of every row, (n,).
     """
 
     key: str
     kind: str
     bodies: tuple[int, int]
-    points: tuple[Point, Point]
-    constant: float = 0.0
-    direction: float = 0.0
+    points: tuple[Ends, Ends]
+    constant: Array | float = 0.0
+    direction: Array | float = 0.0
     drive: int | None = None
     of: tuple[str, str] = ("", "")
 
@@ -162,6 +166,9 @@ def blocks_of(names: list[str], equations: list[Equation]) -> list[Block]:
         if missing:
             joints = ", ".join(dict.fromkeys(e.key for e in block.equations)) or "nothing"
             what = f"leave {missing} free" if missing > 0 else f"hold {-missing} too often"
+            drives = [e.key for e in block.equations if e.drive is not None]
+            if missing < 0 and len(drives) > 1:
+                what += f"; is one of {', '.join(drives)} too many?"
             raise ParameterError(
                 f"bodies: {words}: expected each of {3 * len(block.bodies)} motions held once by "
                 f"joints and drives, but {joints} {what}"
@@ -183,7 +190,7 @@ def _next_block(held: set[int], waiting: list[int], equations: list[Equation]) -
     return Block(tuple(waiting), tuple(own))
 
 
-def _turned(angle: Array, point: Point) -> Array:
+def _turned(angle: Array, point: Ends) -> Array:
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * point[0] - s * point[1], s * point[0] + c * point[1]], axis=-1)
 

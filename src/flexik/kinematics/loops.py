@@ -194,9 +194,16 @@ class Linkage:
         condition = [np.linalg.cond(b.system(pose, at)[1])[0] for b in self.blocks]
         loop = self._words(self.blocks[int(np.argmax(condition))].bodies)
         unit = "rad" if given.kind == "revolute" else "m"
+        span, dead = "", float(at[0, drive])
+        if given.kind == "cylinder":
+            low, high = (given.retracted + limit for limit in given.limits)
+            span = (
+                f", where the points are {given.retracted + dead:.4g} m apart; with retracted it "
+            )
+            span += f"spans {low:.4g} to {high:.4g} m"
         raise ParameterError(
             f"drives.{name}.limits: expected a loop that closes from {given.limits[0]:g} to "
-            f"{given.limits[1]:g} {unit}; that of {loop} has its dead point at {at[0, drive]:.4g}"
+            f"{given.limits[1]:g} {unit}; that of {loop} has its dead point at {dead:.4g}{span}"
         )
 
     def _words(self, bodies: tuple[int, ...]) -> str:
@@ -216,18 +223,35 @@ class Linkage:
                         angles[inner] = angles[outer] - turn
         return angles
 
+    def _apart(self, block: Block, poses: Array) -> str:
+        """What the cylinders of a block span, and how far apart their points are in `poses`."""
+        words = ""
+        for e in block.equations:
+            if e.kind == "distance" and e.drive is not None:
+                distance = float(e.evaluate(poses, np.zeros((1, len(self.lower))))[0][0, 0])
+                shortest, longest = (
+                    e.constant + self.lower[e.drive],
+                    e.constant + self.upper[e.drive],
+                )
+                words += (
+                    f"; {e.key}.retracted + limits are {shortest:.4g} to {longest:.4g} m, at the "
+                    f"angles given its points are {distance + e.constant:.4g} m apart"
+                )
+        return words
+
     def _assembled(self, values: Array) -> Array:
         """Pose (1, b, 3) at `values` (1, k) that the angles of the machine file mean."""
         angles = self._angles(values[0])
         poses = _placed(angles, self.equations)
         for block in self.blocks:
+            apart = self._apart(block, poses)
             closed = _newton(block, poses, values, None, ASSEMBLY_TURN, 5 * NEWTON_STEPS)
             words = self._words(block.bodies)
             joints = ", ".join(dict.fromkeys(e.key for e in block.equations))
             if not closed.all():
                 raise ParameterError(
                     f"bodies: {words} cannot be put together ({joints}) with all drives in the "
-                    "middle of their limits: expected other dimensions or angles"
+                    f"middle of their limits: expected other dimensions or angles{apart}"
                 )
             if np.linalg.cond(block.system(poses, values)[1])[0] > SINGULAR:
                 raise ParameterError(

@@ -8,8 +8,8 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from flexik.machines.sections import Array, Section, SectionKind, plausible
-from flexik.parameters.model import Count, Model, Positive
+from flexik.machines.sections import Array, Section, SectionKind
+from flexik.parameters.model import Model, Positive, plausible
 
 # Abscissas this close are the same, m
 TOLERANCE = 1e-6
@@ -56,7 +56,9 @@ class Angled(Model):
             if plain != key and plain in data:
                 raise ValueError(f"{plain}: stands twice, in rad and in degrees")
             entries = value if isinstance(value, list) else [value]
-            if plain != key and all(isinstance(entry, int | float) for entry in entries):
+            if plain != key and plain in cls.model_fields:
+                if not all(isinstance(entry, int | float) for entry in entries):
+                    raise ValueError(f"{key}: expected numbers, got {value!r}")
                 key, value = plain, np.radians(value).tolist()
             found[key] = value
         return found
@@ -65,8 +67,8 @@ class Angled(Model):
 class _Body(Angled):
     """What all bodies have.
 
-    points : by name, in the frame of the body; a beam has a node near the foot of each, in this
-        order of precedence, unless the foot lies beyond its ends.
+    points : by name, x and y in m in the frame of the body; a beam has a node near the
+        foot of each, in this order of precedence, unless the foot lies beyond its ends.
     angle : of its frame from the ground's x with all drives in the middle of their limits; about
         right is enough, to tell which of two ways to put a linkage together is meant.
     masses : further masses by point, in kg.
@@ -78,7 +80,11 @@ class _Body(Angled):
 
 
 class Rigid(_Body):
-    """A body that does not bend: `mass` in kg, its `centre` in its own frame."""
+    """A body that does not bend.
+
+    mass : kg, without further masses.
+    centre : of mass, in its own frame.
+    """
 
     kind: Literal["rigid"]
     mass: Mass
@@ -95,11 +101,14 @@ class Beam(_Body):
     axis : line of the centroids of its sections in its own frame, straight between these points.
     start : abscissa of the first of them, to which section and mass_span refer; it grows along the
         axis.
-    youngs_modulus, poisson : Pa and none; poisson is for shear alone.
+    section : width, height and so on, or a table.
+    youngs_modulus : Pa; of steel 210e9.
+    poisson : for shear alone.
     shear_coefficient : share of the area that bears shear (Timoshenko); needed for shear.
     stiffness_factor : of its bending stiffness, or `fit`.
-    mass, centre : kg; centre of mass in the body's frame; or else
-    density : kg/m3 of the section.
+    mass : kg, with its centre; or else density.
+    centre : of mass, in the body's frame.
+    density : kg/m3 of the section, in place of mass and centre.
     mass_span : abscissas between which the mass lies, all of it if not given; the mass of a length
         follows the area times a linear factor that gives mass and centre.
     n_elements : finite elements of equal length; points add nodes.
@@ -117,7 +126,7 @@ class Beam(_Body):
     centre: Point | None = None
     mass_span: tuple[Coordinate, Coordinate] | None = None
     density: Density | None = None
-    n_elements: Annotated[Count, Field(le=MOST_ELEMENTS)]
+    n_elements: Annotated[int, Field(ge=1, le=MOST_ELEMENTS)]
 
     @property
     def span(self) -> tuple[float, float]:
@@ -187,7 +196,10 @@ class Beam(_Body):
             low, high = self.span
             first, last = self.mass_span
             if not low - TOLERANCE <= first < last <= high + TOLERANCE:
-                raise ValueError(f"mass_span: must increase and lie within {low:g} and {high:g} m")
+                raise ValueError(
+                    f"mass_span: expected two increasing values within {low:g} and {high:g} m, got "
+                    f"{first:g} and {last:g}"
+                )
         if self.centre is not None:
             first, last = self.mass_span or self.span
             if not first < self.foot(self.centre)[0] < last:

@@ -25,8 +25,9 @@ class Deviations(Model):
     play : median radial clearance of a pin, m: 40 mm pin, H9/d9.
     stroke_offset : of the constant error of a stroke sensor, m: zeroed within 1 mm.
     angle_offset : of that of the angle of a revolute drive, rad.
-    repeatability, angle_repeatability : of what a stroke or an angle differs from one approach to
-        the next, m and rad: dead band and friction of the servo.
+    repeatability : of what a stroke differs from one approach to the next, m: dead band and
+        friction of the servo.
+    angle_repeatability : the same of an angle, rad.
     section : of the logarithm of the bending stiffness of a beam: tolerances.
     spring : of the logarithm of the stiffness of a spring in a fixed joint.
     """

@@ -29,8 +29,7 @@ from flexik.machines.bodies import (
     Reference,
     Rigid,
 )
-from flexik.machines.sections import plausible
-from flexik.parameters.model import Model
+from flexik.parameters.model import Model, check_increase, plausible
 from flexik.parameters.reading import read_yaml, validated
 
 GROUND = "ground"
@@ -46,9 +45,10 @@ Pair = tuple[Reference, Reference]
 
 
 class Springs(Model):
-    """What gives way in a fixed joint, N m/rad and N/m: a value or `fit`; not given: it is rigid.
+    """What gives way in a fixed joint: a value or `fit`; not given: it is rigid.
 
-    x and y are of the inner body's frame.
+    torsion : N m/rad.
+    x, y : N/m, along the axes of the inner body's frame.
     """
 
     torsion: Free | None = None
@@ -57,7 +57,10 @@ class Springs(Model):
 
 
 class _Joint(Angled):
-    """`of`: the two points that it joins, of the inner and of the outer body."""
+    """What all joints have.
+
+    of : the two points that it joins, of the inner and of the outer body.
+    """
 
     of: Pair
 
@@ -69,7 +72,11 @@ class Pin(_Joint):
 
 
 class Fixed(_Joint):
-    """The two points are one, and the outer body stands at `angle` to the inner one."""
+    """The two points are one, and the outer body stands at an angle to the inner one.
+
+    angle : of the outer body's frame from the inner one's, rad.
+    springs : what gives way; not given: nothing.
+    """
 
     kind: Literal["fixed"]
     angle: Angle = 0.0
@@ -82,6 +89,7 @@ class Slide(_Joint):
     of : the pads. That of the inner body touches the outer body, on a line along `direction` in the
         inner one's frame; the other touches the inner body, on that line too. A telescope drive
         acts on the outer body's pad.
+    angle : of the outer body's frame from the inner one's, rad.
     direction : of sliding, in the frame of the inner body.
     """
 
@@ -91,21 +99,25 @@ class Slide(_Joint):
 
 
 class _Drive(Angled):
-    """limits: least and largest coordinate, m or rad."""
+    """What all drives have.
+
+    limits : least and largest coordinate, m or rad.
+    """
 
     limits: tuple[float, float]
 
     @model_validator(mode="after")
     def _increases(self) -> Self:
-        if not self.limits[0] < self.limits[1]:
-            raise ValueError("limits: must increase")
+        check_increase(self, "limits")
         return self
 
 
 class Cylinder(_Drive):
-    """Links two points `of` two bodies, `retracted` + stroke apart; the stroke is its coordinate.
+    """Links two points of two bodies, retracted + stroke apart; the stroke is its coordinate.
 
-    `masses` (kg) hang on the first and on the second point: what the cylinder weighs.
+    of : the two points.
+    retracted : distance of the points at stroke 0, m.
+    masses : kg that hang on the first and on the second point: what the cylinder weighs.
     """
 
     kind: Literal["cylinder"]
@@ -122,9 +134,12 @@ class Cylinder(_Drive):
 
 
 class Telescope(_Drive):
-    """Moves the outer body of the slide `joint`.
+    """Moves the outer body of a slide; the stroke is its coordinate.
 
-    The second point `of` lies `retracted` + stroke ahead of the first, along the slide.
+    joint : name of the slide.
+    of : points of its inner and of its outer body; the second lies retracted + stroke ahead of the
+        first, along the slide.
+    retracted : how far ahead it is at stroke 0, m.
     """
 
     kind: Literal["telescope"]
@@ -135,7 +150,11 @@ class Telescope(_Drive):
 
 
 class Revolute(_Drive):
-    """Turns the outer body of the pin `joint` by `zero` + coordinate from the inner one."""
+    """Turns the outer body of a pin by zero + coordinate from the inner one.
+
+    joint : name of the pin.
+    zero : angle of the outer body's frame from the inner one's at coordinate 0, rad.
+    """
 
     kind: Literal["revolute"]
     joint: Name
@@ -163,9 +182,12 @@ class PlanarMachine(Angled):
     element : of all beams, see multibody.elements.
     shear : whether beams shear; `included` needs the shear_coefficient of every beam.
     kinematics : `general`, or the closed form of a machine whose bodies and points bear its names.
-    ground : points of the ground by name.
-    drives : in the order of the actuator coordinates.
-    payload : the tip, where the payload hangs.
+    ground : points of the ground by name, x forward and y up, m.
+    bodies : beams and rigid bodies by name; the ground is none of these.
+    joints : what joins two bodies, by name.
+    drives : cylinders and the like by name, in the order of the actuator coordinates; one to six.
+    payload : the tip, where the payload hangs, a body.point.
+    notes : sources and assumptions that the report tells.
     instruments : what measures the machine, if a case reads it; nothing here does.
     smallest_first : the drive whose coordinate the inverse keeps as small as it can where there is
         more than one solution; not given: the solution nearest to the current one.
@@ -181,6 +203,7 @@ class PlanarMachine(Angled):
     joints: Annotated[dict[Name, Joint], Field(min_length=1)]
     drives: Annotated[dict[Name, Drive], Field(min_length=1, max_length=6)]
     payload: Reference
+    notes: tuple[str, ...] = ()
     instruments: Any = None
     smallest_first: Name | None = None
 
@@ -247,16 +270,29 @@ class PlanarMachine(Angled):
         for group in ("joints", "drives"):
             for name, part in getattr(self, group).items():
                 self._check_pair(f"{group}.{name}", part)
+        driven: dict[str, str] = {}
+        for name, drive in self.drives.items():
+            if (joint := getattr(drive, "joint", None)) in driven:
+                raise ValueError(
+                    f"drives.{name}.joint: {joint} is driven by {driven[joint]} already"
+                )
+            driven |= {} if joint is None else {joint: name}
         for name, body in self.bodies.items():
             for point in body.masses:
                 if point not in body.points:
-                    raise ValueError(f"bodies.{name}.masses.{point}: the body has no such point")
+                    known = ", ".join(body.points)
+                    raise ValueError(
+                        f"bodies.{name}.masses.{point}: the body has no such point, only {known}"
+                    )
         for name, beam in self.beams.items():
             if self.shear == "included" and beam.shear_coefficient is None:
                 raise ValueError(f"bodies.{name}.shear_coefficient: missing, and shear is included")
         self._check_end(self.payload, "payload")
         if self.smallest_first is not None and self.smallest_first not in self.drives:
-            raise ValueError("smallest_first: expected the name of a drive")
+            raise ValueError(
+                f"smallest_first: expected the name of a drive ({', '.join(self.drives)}), got "
+                f"{self.smallest_first}"
+            )
         return self
 
     def _check_end(self, reference: str, key: str) -> str:
@@ -270,7 +306,11 @@ class PlanarMachine(Angled):
         if wanted:
             joint = self.joints.get(part.joint)
             if joint is None or joint.kind != wanted:
-                raise ValueError(f"{key}.joint: expected the name of a {wanted}")
+                known = [name for name, other in self.joints.items() if other.kind == wanted]
+                raise ValueError(
+                    f"{key}.joint: expected the name of a {wanted} ({', '.join(known) or 'none'}), "
+                    f"got {part.joint}"
+                )
         if part.kind == "revolute":
             return
         ends = [self._check_end(end, f"{key}.of") for end in part.of]
@@ -317,7 +357,7 @@ def _wrong_sections(machine: PlanarMachine, name: str) -> list[str]:
     try:
         section = beam.profile()
     except DataError as error:
-        return [f"{key}.section: {error}"]
+        return [f"{key}.section.file: {error}"]
     x, slack = section.abscissa, UNCOVERED * (high - low)
     if x[0] > low + slack or x[-1] < high - slack:
         covered = f"{x[0]:g} to {x[-1]:g} m"

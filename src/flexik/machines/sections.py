@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from flexik.errors import DataError
-from flexik.parameters.model import Model
+from flexik.parameters.model import Model, plausible
 
 Array = NDArray[np.float64]
 
@@ -41,37 +41,21 @@ def read_section(path: Path | str) -> Section:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # NumPy only warns of an empty file
             table = np.genfromtxt(path, delimiter=",", names=True, dtype=float, encoding="utf-8")
-    except (OSError, ValueError, IndexError, UserWarning) as error:
+    except OSError as error:  # NumPy's words name the file once more
+        reason = error.strerror or "there is no such file"
+        raise DataError(f"section table {path}: cannot be read ({reason})") from None
+    except (ValueError, IndexError, UserWarning) as error:
         reason = " ".join(str(error).split())
         raise DataError(f"section table {path}: cannot be read ({reason})") from None
     if table.dtype.names != SECTION_COLUMNS:
-        raise DataError(f"section table {path}: columns {table.dtype.names}, not {SECTION_COLUMNS}")
+        known, got = ", ".join(SECTION_COLUMNS), ", ".join(table.dtype.names or ("none",))
+        raise DataError(f"section table {path}: expected columns {known}, got {got}")
     x, second_moment, area = (np.atleast_1d(table[name]) for name in SECTION_COLUMNS)
     if len(x) < 2 or not (np.diff(x) > 0).all():
         raise DataError(f"section table {path}: x_m must increase over at least two rows")
     if not ((second_moment > 0).all() and (area > 0).all()):
         raise DataError(f"section table {path}: Iz_m4 and A_m2 must be positive numbers")
     return Section(x, second_moment, area)
-
-
-def plausible(low: float, high: float, unit: str, **guesses: float) -> AfterValidator:
-    """Refuse a number unless it is 0 or its size lies from `low` to `high` in `unit`.
-
-    guesses : `unit` by which a user may have meant it; the first that makes sense is proposed.
-    """
-
-    def check(value: float) -> float:
-        if value == 0 or low <= abs(value) <= high:
-            return value
-        hint = ""
-        for name, factor in guesses.items():
-            if low <= abs(value * factor) <= high:
-                hint = f" ({value:g} {name} would be {value * factor:g})"
-                break
-        words = f"expected {unit} of a size from {low:g} to {high:g}{hint}"
-        raise PydanticCustomError("implausible", "{words}", {"words": words})
-
-    return AfterValidator(check)
 
 
 # Largest of a section's own dimensions, m
@@ -87,7 +71,10 @@ def _plain_path(path: str) -> str:
 
 
 class Table(Model):
-    """A CSV of columns x_m, Iz_m4, A_m2 over the abscissa of the beam; linear between rows."""
+    """A table of the section over the abscissa of the beam, linear between rows.
+
+    file : CSV of columns x_m, Iz_m4, A_m2, found from the folder of the project.
+    """
 
     kind: Literal["table"]
     file: Annotated[str, AfterValidator(_plain_path)]
@@ -114,7 +101,10 @@ class _ClosedForm(Model):
 
 
 class Box(_ClosedForm):
-    """Hollow rectangle: outer `width`, `height` in the plane of bending, `wall`, in m."""
+    """Hollow rectangle; each dimension one number, or those of the first and last section.
+
+    width, height, wall : outer, height in the plane of bending, m.
+    """
 
     kind: Literal["box"]
     width: Taper
@@ -135,7 +125,10 @@ class Box(_ClosedForm):
 
 
 class Tube(_ClosedForm):
-    """Hollow circle: outer `diameter` and `wall`, in m."""
+    """Hollow circle; each dimension one number, or those of the first and last section.
+
+    diameter, wall : outer, m.
+    """
 
     kind: Literal["tube"]
     diameter: Taper
@@ -154,7 +147,10 @@ class Tube(_ClosedForm):
 
 
 class Solid(_ClosedForm):
-    """Full rectangle: `width`, and `height` in the plane of bending, in m."""
+    """Full rectangle; each dimension one number, or those of the first and last section.
+
+    width, height : height in the plane of bending, m.
+    """
 
     kind: Literal["solid"]
     width: Taper

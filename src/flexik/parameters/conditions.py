@@ -17,7 +17,11 @@ from flexik.parameters.model import (
 
 
 class Points(Model):
-    """Every point (x, y in m) with every payload (kg)."""
+    """Every point with every payload.
+
+    points : x and y, m.
+    payloads : kg.
+    """
 
     points: Annotated[list[Vector], Field(min_length=1)]
     payloads: Annotated[list[NotNegative], Field(min_length=1)]
@@ -30,7 +34,15 @@ class Points(Model):
 
 
 class RandomTargets(Model):
-    """Random targets that the loaded machine reaches, see evaluation.targets; m and kg."""
+    """Random targets that the loaded machine reaches, see evaluation.targets.
+
+    n_targets : that many are kept of those drawn.
+    x, y : least and largest coordinate of a target, m.
+    payload : least and largest, kg.
+    tolerance : the loaded tip can be put this near to a target, m.
+    n_iterations : most steps towards it.
+    seed : of the drawing.
+    """
 
     n_targets: Count
     x: Interval

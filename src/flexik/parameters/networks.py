@@ -6,11 +6,15 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from flexik.parameters.model import Count, Model, Name, NotNegative, Positive, Seed
+from flexik.parameters.model import Model, Name, NotNegative, Positive, Restarts, Seed, Units
 
 
 class Axis(Model):
-    """Evenly spaced values from minimum to maximum."""
+    """Evenly spaced values.
+
+    minimum, maximum : both included.
+    increment : a whole number of them lies between.
+    """
 
     minimum: float
     maximum: float
@@ -18,9 +22,16 @@ class Axis(Model):
 
     @model_validator(mode="after")
     def _whole_steps(self) -> Self:
-        steps = (self.maximum - self.minimum) / self.increment
-        if self.maximum < self.minimum or abs(steps - round(steps)) > 1e-6:
-            raise ValueError("increment: maximum - minimum must be a whole number of increments")
+        least, most, steps = self.minimum, self.maximum, self.maximum - self.minimum
+        if most < least:
+            raise ValueError(f"maximum: expected the minimum, {least:g}, or more, got {most:g}")
+        steps /= self.increment
+        if abs(steps - round(steps)) > 1e-6:
+            raise ValueError(
+                f"increment: expected a whole number of increments from {least:g} to {most:g}, "
+                f"{self.increment:g} makes {steps:.4g}; {(most - least) / round(steps + 0.5):.6g} "
+                "would do"
+            )
         return self
 
     @property
@@ -32,9 +43,9 @@ class Axis(Model):
 class Sizes(Axis):
     """Numbers of hidden units of a layer to choose from."""
 
-    minimum: Count
-    maximum: Count
-    increment: Count
+    minimum: Units
+    maximum: Units
+    increment: Units
 
     def values(self) -> list[int]:
         """All of them."""
@@ -42,17 +53,19 @@ class Sizes(Axis):
 
 
 class Select(Model):
-    """Study of sizes: every size from `n_restarts` starts.
+    """Study of sizes: every size from several starts.
 
-    The smallest size within the share `tolerance` of the least selection error is chosen.
+    n_restarts : of each size.
+    tolerance : the smallest size within this share of the least selection error is chosen.
+    trainer : a name under trainers.
     """
 
-    n_restarts: Count = 3
+    n_restarts: Restarts = 3
     tolerance: NotNegative = 0.0
     trainer: Name = "study"
 
 
-Layer = Count | Sizes
+Layer = Units | Sizes
 
 
 class Network(Model):
@@ -61,6 +74,10 @@ class Network(Model):
     n_hidden : units of the hidden layer, or of each of several; where Sizes stand, the selection
         error chooses among all of them.
     corrects : name of a network that this one is added to, so that both are one.
+    select : how the size is chosen, if it is.
+    activation : of the hidden units.
+    n_restarts : trainings from random weights, of which the least selection error is kept.
+    seed : of the weights.
     trainer : a name under trainers.
     """
 
@@ -69,7 +86,7 @@ class Network(Model):
     n_hidden: Layer | Annotated[list[Layer], Field(min_length=1)]
     select: Select = Select()
     activation: Literal["tanh", "logistic"] = "tanh"
-    n_restarts: Count
+    n_restarts: Restarts
     seed: Seed = 1
     trainer: Name = "accelerated"
 

@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 import yaml
 from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
 
 from flexik.errors import ParameterError
 
@@ -43,14 +44,14 @@ def validated(model: type[T], data: Any, source: Callable[[list[str]], tuple[str
         found = []
         for detail in error.errors():
             location = _keys(detail["loc"], data, detail["type"] == "missing")
-            message = _MESSAGES.get(detail["type"], detail["msg"]).removeprefix("Value error, ")
-            if detail["type"].startswith("union_tag"):
-                message = message.format(**detail["ctx"])
+            message = _in_our_words(detail)
             if detail["type"] == "value_error":  # our own: "key within the section: what is wrong"
                 within, _, message = message.partition(": ")
                 location += within.split(".")
             given = detail["input"]
-            shown = f", got {given!r}" if not isinstance(given, dict | list | BaseModel) else ""
+            shown = f", got {'nothing' if given is None else repr(given)}"
+            if isinstance(given, dict | list | BaseModel):
+                shown = ""
             found.append((location, detail["type"].endswith(_OF_TYPE), f"{message}{shown}"))
         lines = []
         for location, _, message in _likeliest(found):
@@ -60,20 +61,46 @@ def validated(model: type[T], data: Any, source: Callable[[list[str]], tuple[str
 
 
 # In place of pydantic's own words
+_NUMBER, _WHOLE = "expected a number", "expected a whole number"
+_LIST, _MAPPING = "expected a list", "expected a mapping of keys to values"
 _MESSAGES = {
     "extra_forbidden": "there is no such key",
     "missing": "this key is missing",
     "union_tag_not_found": "key {discriminator} is missing or names none",
     "union_tag_invalid": "{discriminator} is '{tag}', expected one of {expected_tags}",
+    **dict.fromkeys(("float_type", "float_parsing"), _NUMBER),
+    **dict.fromkeys(("int_type", "int_parsing", "int_parsing_size", "int_from_float"), _WHOLE),
+    **dict.fromkeys(("list_type", "tuple_type"), _LIST),
+    **dict.fromkeys(("dict_type", "mapping_type", "model_type", "model_attributes_type"), _MAPPING),
+    "string_type": "expected a text",
+    "finite_number": "expected a finite number",
+    "greater_than": "expected more than {gt:g}",
+    "greater_than_equal": "expected {ge:g} or more",
+    "less_than": "expected less than {lt:g}",
+    "less_than_equal": "expected {le:g} or less",
+    "literal_error": "expected {expected}",
+    "too_short": "expected at least {min_length} of them, got {actual_length}",
+    "too_long": "expected at most {max_length} of them, got {actual_length}",
+    "string_too_short": "expected a text that is not empty",
+    "string_pattern_mismatch": "a name is small letters, digits and _, the first a letter",
 }
 _OF_TYPE = ("_type", "_parsing", "_from_float")
 Mistake = tuple[list[str], bool, str]
 
 
+def _in_our_words(detail: ErrorDetails) -> str:
+    if detail["type"] == "missing" and isinstance(detail["loc"][-1], int):
+        return f"expected another entry, got {len(detail['input'])}"
+    message = _MESSAGES.get(detail["type"])
+    if message is None:
+        return detail["msg"].removeprefix("Value error, ")
+    return message.format(**detail.get("ctx", {}))
+
+
 def _likeliest(found: Sequence[Mistake]) -> list[Mistake]:
     """One mistake a key: where a value may be of several types, pydantic tells one for each."""
     kept: list[Mistake] = []
-    for location, of_type, message in sorted(found, key=lambda mistake: mistake[1]):
+    for location, of_type, message in sorted(found, key=lambda given: (given[1], -len(given[0]))):
         if not (of_type and any(other[: len(location)] == location for other, _, _ in kept)):
             kept.append((location, of_type, message))
     return sorted(kept, key=found.index)

@@ -1,6 +1,7 @@
 """What the section of every case has."""
 
 from pathlib import Path
+from typing import ClassVar
 
 from flexik.parameters.model import Model, Name
 from flexik.parameters.trainers import Trainer
@@ -14,6 +15,8 @@ class CaseSection(Model):
     code : folder of flexik/cases whose code it runs
     calibration : settings of the fit where constants of the machine are free
     """
+
+    put_in: ClassVar[frozenset[str]] = frozenset({"name", "code", "machine", "trainers"})
 
     name: Name
     code: Name

@@ -19,6 +19,7 @@ class Stopping(Model):
     minimum_gradient : Euclidean norm of the gradient of that error at which it ends
     minimum_progress : relative fall of that error over `progress_window` iterations under which
         it ends; 0: never
+    progress_window : iterations
     maximum_seconds : wall time after which it ends; results then depend on the machine
     selection_patience : iterations without a new least selection error after which it ends; the
         network of the least selection error is kept, however the run ends
@@ -39,7 +40,11 @@ class Stopping(Model):
 
 
 class Damped(Stopping):
-    """What both schedules of Levenberg-Marquardt share: damping mu, and where a run ends."""
+    """What both schedules of Levenberg-Marquardt share: damping mu, and where a run ends.
+
+    mu : the first damping
+    mu_maximum : a run ends beyond this damping
+    """
 
     mu: Positive
     mu_maximum: Positive = 1e10
@@ -88,6 +93,7 @@ class BackPropagation(Stopping):
     rate_increase : factor of the learning rate after a pass that lowers the error
     rate_decrease : factor after a pass that raises it by more than `error_increase`; that pass is
         taken back and the momentum cleared; all three are MATLAB's traingdx's
+    error_increase : factor of the error
     minimum_rate : the run ends when the learning rate falls below it
     """
 
@@ -124,7 +130,10 @@ class Adam(Stopping):
 
 
 class Lbfgs(Stopping):
-    """See learning.lbfgs; `memory` is the number of steps that tell the curvature."""
+    """See learning.lbfgs.
+
+    memory : number of steps that tell the curvature
+    """
 
     kind: Literal["lbfgs"] = "lbfgs"
     memory: Count = 20

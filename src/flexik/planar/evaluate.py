@@ -23,8 +23,9 @@ from flexik.machines.planar import PlanarMachine
 from flexik.multibody.planar import tips
 from flexik.parameters.conditions import Points
 from flexik.planar.conditions import at, at_points
+from flexik.planar.constants import model_inputs
 from flexik.planar.fields import QUERY, target_fields
-from flexik.planar.machine import columns_of, flexible, model_inputs
+from flexik.planar.machine import columns_of, flexible
 from flexik.planar.methods import method_inputs, method_settings, trained_method
 from flexik.planar.section import PlanarSection
 from flexik.positioning.method import Columns, Method, Settings
@@ -95,7 +96,10 @@ def prepare(
         frame = read_table(targets, target_fields(machine))[:n_targets]
         query = frame[[field.name for field in QUERY]].to_numpy()
         conditions = at(query, np.arange(len(query)), manipulator)
-    with_network = functools.partial(trained_method, method, build, manipulator, samples=samples)
+    built = flexible(machine, constants)
+    with_network = functools.partial(
+        trained_method, method, build, manipulator, samples=samples, machine=built.machine
+    )
     asked = with_network(network)
     items: list[Any] = [(asked, piece) for piece in conditions.chunks(ROWS)]
     n_pieces, columns = len(items), columns_of(machine)
@@ -107,8 +111,8 @@ def prepare(
         found = stacked(results[:n_pieces], fields)
         of_method = statistics(pd.DataFrame(found))
         print(
-            f"{name}: mean error {1e3 * of_method['mean_error']:.2f} mm, "
-            f"max {1e3 * of_method['max_error']:.2f} mm, "
+            f"{name}: mean error {1e3 * of_method['mean_error']:.3g} mm, "
+            f"max {1e3 * of_method['max_error']:.3g} mm, "
             f"{of_method['n_failed']} of {of_method['n_conditions']} failed"
         )
         writers = {".parquet": table(found, fields)}
@@ -117,7 +121,7 @@ def prepare(
             writers[".spread.parquet"] = table(_spread(records, results[n_pieces:]), SPREAD_FIELDS)
         return writers
 
-    judge = tip_judge(functools.partial(tips, flexible(machine, constants)))
+    judge = tip_judge(functools.partial(tips, built))
     return Work(functools.partial(_errors, judge, columns), items, finish)
 
 

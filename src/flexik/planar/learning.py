@@ -3,7 +3,6 @@
 import functools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import pandas as pd
@@ -13,7 +12,14 @@ from flexik.datasets.tables import Field, read_table
 from flexik.kinematics.crane import inverse
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.machine_file import manipulator_of
-from flexik.kinematics.manipulator import Manipulator
+from flexik.kinematics.manipulator import Manipulator, RigidSolution
+from flexik.learning.payload_polynomial import (
+    DEGREES,
+    Interpolated,
+    Predictor,
+    lagrange,
+    nodes_of,
+)
 from flexik.learning.perceptron import quantities
 from flexik.learning.training import Architecture, Lesson
 from flexik.machines.planar import PlanarMachine
@@ -28,15 +34,26 @@ from flexik.planar.fields import (
     kept,
     sample_fields,
 )
+from flexik.planar.fields import inputs as inputs_of
 
 Array = NDArray[np.float64]
 
-# Coordinates closer than this are the same, m or rad
+# Coordinates and tips closer than this are the same, m or rad
 _SAME = 1e-6
+# Coordinates that a payload moves less, in shares of their ranges, are of the same pose
+_NEAR = 0.1
 
 DEFLECTION = (
     Field("deflection_x", "m", "flexible minus rigid tip"),
     Field("deflection_y", "m", "flexible minus rigid tip"),
+)
+REMAINDER = (
+    Field("remainder_x", "m", "flexible tip minus that of beam theory"),
+    Field("remainder_y", "m", "flexible tip minus that of beam theory"),
+)
+SHIFT = (
+    Field("shift_x", "m", "rigid minus flexible tip"),
+    Field("shift_y", "m", "rigid minus flexible tip"),
 )
 CORRECTION = (
     Field("correction_x", "m", "flexible tip minus the rigid network's"),
@@ -63,21 +80,34 @@ def kind_of(machine: PlanarMachine, name: str) -> Kind:
     """The kind `name` of networks of `machine`; an inverse one is told coordinates beyond two."""
     given = coordinates(machine)
     loaded = (*given, PAYLOAD)
-    return {
+    moved = tuple(
+        Field(f"shift_{f.name}", f.unit, f"{f.name} minus that of the rigid inverse of the tip")
+        for f, drive in zip(given, machine.drives, strict=True)
+        if drive != machine.smallest_first
+    )
+    known = {
         "deflection": Kind(loaded, DEFLECTION),
+        "remainder": Kind(loaded, REMAINDER),
         "tip": Kind(loaded, TIP),
         "rigid_tip": Kind(given, RIGID, once_a_pose=True),
         "correction": Kind(loaded, CORRECTION),
         "coordinates": Kind((*TIP, PAYLOAD, *given[2:]), given[:2], one_branch=True),
-    }[name]
+        "target_shift": Kind(loaded, SHIFT),
+        "stroke_shift": Kind(loaded, moved),
+    }
+    known |= {
+        kind: Kind(given, at_nodes(degree), once_a_pose=True) for kind, degree in DEGREES.items()
+    }
+    return known[name]
 
 
-class Predictor(Protocol):
-    """A trained network."""
-
-    def predict(self, values: Array, /) -> Array:
-        """Return outputs (n, q) at inputs (n, p), in SI units."""
-        ...
+def at_nodes(degree: int) -> Fields:
+    """Deflections at the payloads of payload_polynomial.nodes_of."""
+    return tuple(
+        Field(f"deflection_{axis}_{k}", "m", f"flexible minus rigid tip at payload {k} of {degree}")
+        for k in range(degree + 1)
+        for axis in "xy"
+    )
 
 
 def lesson(
@@ -88,17 +118,23 @@ def lesson(
     machine: PlanarMachine,
     grid: Path,
     selection: Path,
-    rigid: Predictor | None = None,
+    base: Predictor | None = None,
 ) -> Lesson:
     """What a network of `kind` learns from the table `grid`, chosen by `selection`.
 
-    `rigid` is the trained rigid network that a correction corrects, its errors included
-    (Rouvinen 1999, chapter 4.3); only kind `correction` needs it.
+    `base` is what others add to: of kind `correction` the trained rigid network, its errors
+    included (Rouvinen 1999, chapter 4.3), of kind `remainder` beam theory.
     """
     tables = [kept(read_table(path, sample_fields(machine))) for path in (grid, selection)]
-    (inputs, outputs), chosen_by = (_pair(table, kind, machine, rigid) for table in tables)
-    judge = None
-    if kind == "coordinates":
+    judge, chosen_by = None, None
+    if kind in DEGREES:
+        inputs, outputs = _polynomials(tables[0], machine, DEGREES[kind])
+        nodes, chosen = nodes_of(tables[0], DEGREES[kind]), tables[1]
+        asked, answers = chosen[inputs_of(machine)].to_numpy(), deflection(chosen)
+        judge = functools.partial(error_of_deflection, nodes, asked, answers)
+    else:
+        (inputs, outputs), chosen_by = (_pair(table, kind, machine, base) for table in tables)
+    if kind == "coordinates" and chosen_by is not None:
         reach = np.ptp(tables[0][_names(TIP)].to_numpy(), axis=0) / 2.0
         judge = functools.partial(error_at_tip, manipulator_of(machine), *chosen_by, reach)
     columns = kind_of(machine, kind)
@@ -144,14 +180,27 @@ def correction(table: pd.DataFrame, machine: PlanarMachine, rigid: Predictor) ->
     return table[_names(TIP)].to_numpy() - rigid.predict(values)
 
 
+def error_of_deflection(nodes: Array, inputs: Array, values: Array, network: Predictor) -> float:
+    """Root mean square error of deflections (n, 2) at `inputs` (n, k + 1), over half their extent.
+
+    `network` gives them at the payloads `nodes` (m,), see payload_polynomial.
+    """
+    error = Interpolated(network, nodes).predict(inputs) - values
+    return float(np.sqrt(np.mean((error / (np.ptp(values, axis=0) / 2.0)) ** 2)))
+
+
+def rigid_inverse(machine: PlanarMachine, tips: Array, values: Array) -> RigidSolution:
+    """Rigid inverse of `tips` (n, 2) on the branch of the coordinates `values` (n, k)."""
+    manipulator = manipulator_of(machine)
+    if isinstance(manipulator, CraneManipulator):
+        return inverse(manipulator.geometry, tips, values[:, 2])
+    return manipulator.inverse(tips, values)
+
+
 def on_branch(table: pd.DataFrame, machine: PlanarMachine) -> NDArray[np.bool_]:
     """Whether the rigid inverse takes the pose of each row (n,) for its rigid tip and branch."""
     values, tips = (table[_names(f)].to_numpy() for f in (coordinates(machine), RIGID))
-    manipulator = manipulator_of(machine)
-    if isinstance(manipulator, CraneManipulator):
-        taken = inverse(manipulator.geometry, tips, values[:, 2])
-    else:
-        taken = manipulator.inverse(tips, values)
+    taken = rigid_inverse(machine, tips, values)
     return taken.reached & (np.abs(taken.values - values).max(axis=1) < _SAME)
 
 
@@ -164,19 +213,57 @@ def learnt_rows(table: pd.DataFrame, kind: str, machine: PlanarMachine) -> pd.Da
 
 
 def _pair(
-    table: pd.DataFrame, kind: str, machine: PlanarMachine, rigid: Predictor | None
+    table: pd.DataFrame, kind: str, machine: PlanarMachine, base: Predictor | None
 ) -> tuple[Array, Array]:
-    table = learnt_rows(table, kind, machine)
+    table, columns = learnt_rows(table, kind, machine), kind_of(machine, kind)
+    if kind in ("target_shift", "stroke_shift"):
+        return _shifts(table, kind, machine)
     found = {DEFLECTION: deflection(table)}
-    if rigid is not None:
-        found[CORRECTION] = correction(table, machine, rigid)
+    if base is not None and kind == "remainder":
+        found[REMAINDER] = deflection(table) - base.predict(table[inputs_of(machine)].to_numpy())
+    elif base is not None:
+        found[CORRECTION] = correction(table, machine, base)
     for pair, values in found.items():
         table = table.assign(**dict(zip(_names(pair), values.T, strict=True)))
-    columns = kind_of(machine, kind)
     inputs, outputs = (
         table[_names(fields)].to_numpy() for fields in (columns.inputs, columns.outputs)
     )
     return inputs, outputs
+
+
+def _shifts(table: pd.DataFrame, kind: str, machine: PlanarMachine) -> tuple[Array, Array]:
+    """Rigid inverse of the loaded tips, and what it lacks to put the loaded tip there.
+
+    Only of tips that the rigid machine can be put on, though beyond its limits, from the same pose.
+    """
+    values, tips = (table[_names(f)].to_numpy() for f in (coordinates(machine), TIP))
+    rigid, manipulator = rigid_inverse(machine, tips, values), manipulator_of(machine)
+    with np.errstate(invalid="ignore"):
+        moved = np.abs(rigid.values - values) / (manipulator.upper - manipulator.lower)
+        off = np.abs(manipulator.forward(np.nan_to_num(rigid.values)) - tips)
+    used = (moved.max(axis=1) < _NEAR) & (off.max(axis=1) < _SAME)
+    outputs = -deflection(table)
+    if kind == "stroke_shift":
+        kept_drive = [drive != machine.smallest_first for drive in machine.drives]
+        outputs = (values - rigid.values)[:, kept_drive]
+    inputs = np.column_stack([rigid.values, table[PAYLOAD.name]])
+    return inputs[used], outputs[used]
+
+
+def _polynomials(table: pd.DataFrame, machine: PlanarMachine, degree: int) -> tuple[Array, Array]:
+    """Poses, and deflections at the payloads of nodes_of of the polynomials nearest to them."""
+    poses, number = np.unique(
+        table[_names(coordinates(machine))].to_numpy(), axis=0, return_inverse=True
+    )
+    weights = lagrange(nodes_of(table, degree), table[PAYLOAD.name].to_numpy())
+    normal, right = (
+        np.zeros((len(poses), degree + 1, degree + 1)),
+        np.zeros((len(poses), degree + 1, 2)),
+    )
+    np.add.at(normal, number, weights[:, :, None] * weights[:, None])
+    np.add.at(right, number, weights[:, :, None] * deflection(table)[:, None])
+    found = np.asarray(np.linalg.solve(normal, right), dtype=float)
+    return poses, found.reshape(len(poses), -1)
 
 
 def _names(fields: Fields) -> list[str]:

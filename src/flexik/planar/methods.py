@@ -8,6 +8,8 @@ from flexik.datasets.tables import read_table
 from flexik.errors import ParameterError
 from flexik.kinematics.manipulator import Manipulator
 from flexik.learning.storage import load_network
+from flexik.machines.planar import PlanarMachine
+from flexik.planar.constants import known, model_inputs
 from flexik.planar.section import PlanarSection
 from flexik.positioning.method import Ingredients, Method, Network, Settings
 from flexik.positioning.registry import Build, build_of
@@ -35,12 +37,16 @@ def trained_method(
     manipulator: Manipulator,
     network: Path | Network | None = None,
     samples: Mapping[str, Path] | None = None,
+    machine: PlanarMachine | None = None,
 ) -> Method:
-    """The method of `method_settings` with its trained `network` and its tables of samples."""
+    """The method of `method_settings` with its trained `network` and its tables of samples.
+
+    machine : all constants known, for methods that ask it.
+    """
     if isinstance(network, Path):
         network = load_network(network)[0]
     tables = {name: read_table(path) for name, path in (samples or {}).items()}
-    return build(method, Ingredients(manipulator, network, tables))
+    return build(method, Ingredients(manipulator, network, tables, machine))
 
 
 def method_of(section: PlanarSection, name: str) -> Method:
@@ -49,8 +55,9 @@ def method_of(section: PlanarSection, name: str) -> Method:
     Raises ParameterError if there is no such method.
     """
     if name not in section.methods:
-        known = ", ".join(section.methods)
-        raise ParameterError(f"{section.name}.methods: there is no {name!r} ({known})")
-    manipulator = section.manipulator
-    inputs = method_inputs(section, name)
-    return trained_method(**method_settings(section, name), manipulator=manipulator, **inputs)
+        others = ", ".join(section.methods)
+        raise ParameterError(f"{section.name}.methods: there is no {name!r} ({others})")
+    inputs: dict[str, Any] = {"manipulator": section.manipulator, **method_inputs(section, name)}
+    if section.methods[name].asks_machine:
+        inputs["machine"] = known(section.machine, model_inputs(section).get("constants"))
+    return trained_method(**method_settings(section, name), **inputs)

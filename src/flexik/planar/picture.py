@@ -21,6 +21,10 @@ GREY = {"color": style.GREY, "linewidth": 1.0, "zorder": 1}
 BENT = {"color": style.BLUE, "linewidth": 3.0, "zorder": 3, "solid_capstyle": "round"}
 CYLINDER = {"color": style.VERMILION, "linewidth": 2.0, "zorder": 2}
 INK = {"color": style.INK, "zorder": 4}
+HOLLOW = {**INK, "markerfacecolor": "white"}
+TIP = {"zorder": 5, "markersize": 7.0, "markeredgecolor": style.INK}
+# Names this near, over the size of the machine, are one text
+NEAR = 0.12
 DOTS = {"color": style.PALE, "markersize": 2.0, "zorder": 0}
 
 
@@ -44,8 +48,8 @@ def picture(
     every = np.concatenate([every, *bent.values(), loaded[None], below])
     low, high = every.min(axis=0) - ROOM * size, every.max(axis=0) + ROOM * size
     height = float(np.clip((style.WIDTH - 0.7) * (high - low)[1] / (high - low)[0] + 1.4, 3.0, 9.0))
-    enlarged = f", drawn {times:g} times larger" if times > 1.0 else ""
-    title = f"{shape['payload']:g} kg move the tip by {MM * sag:.4g} mm{enlarged}"
+    enlarged = f"both drawn {times:g} times larger" if times > 1.0 else ""
+    title = f"{moved(shape)}\n{enlarged}".strip()
     return draw(
         chart,
         *([_layer(below, ".", "within all limits", **DOTS)] if len(below) else []),
@@ -54,8 +58,9 @@ def picture(
             _layer(nodes, "-", "loaded" if not k else "", **BENT)
             for k, nodes in enumerate(bent.values())
         ),
-        _layer(tips[:1], "o", "rigid tip", markerfacecolor="white", **INK),
-        _layer(loaded[None], "o", "loaded tip", **INK),
+        _layer(tips[:1], "D", "tip, rigid", color="white", **TIP),
+        _layer(loaded[None], "D", "tip, loaded", color=style.BLUE, **TIP),
+        *_names(machine, shape["poses"], rigid),
         x=Axis("x (m)", limits=(low[0], high[0])),
         y=Axis("y (m)", limits=(low[1], high[1])),
         equal=True,
@@ -64,12 +69,22 @@ def picture(
     )
 
 
+def moved(shape: Mapping[str, Any]) -> str:
+    """How far the own weight and the payload of `shape`, see planar.shape.drawn, move the tip."""
+    rigid, own, tip = (np.array(shape[n]) for n in ("rigid_tip", "own_weight_tip", "tip"))
+    weight, payload = (MM * float(np.hypot(*way)) for way in (own - rigid, tip - own))
+    return (
+        f"own weight moves the tip by {weight:.4g} mm, {shape['payload']:g} kg by {payload:.4g} mm"
+        " more"
+    )
+
+
 def _unloaded(
     machine: PlanarMachine, poses: Mapping[str, Array], rigid: Mapping[str, Array]
 ) -> Iterator[Layer]:
     """Bodies, cylinders, pins and pads in the rigid pose."""
     points = _bodies(machine, poses)
-    label = "rigid"
+    label = "bodies, rigid"
     for name, body in machine.bodies.items():
         if isinstance(body, Beam):
             yield _layer(rigid[name], "-", label, **GREY)
@@ -79,7 +94,7 @@ def _unloaded(
         else:
             yield _layer(points[name], "-", label, **GREY)
         label = ""
-    label = "cylinder"
+    label = "cylinder, rigid"
     for drive in machine.drives.values():
         if isinstance(drive, Cylinder):
             yield _layer([_placed(machine, poses, end) for end in drive.of], "-", label, **CYLINDER)
@@ -88,9 +103,44 @@ def _unloaded(
     pins = [_placed(machine, poses, j.of[0]) for j in joints if isinstance(j, Pin)]
     pads = [_placed(machine, poses, end) for j in joints if isinstance(j, Slide) for end in j.of]
     ground = points[GROUND]
-    for places, mark, text in ((pins, "o", "pin"), (pads, "s", "pad"), (ground, "^", "ground")):
+    marks = ((ground, "^", "ground"), (pins, "o", "pin, rigid"), (pads, "s", "pad, rigid"))
+    for places, mark, text in marks:
         if len(places):
-            yield _layer(places, mark, text, markersize=4.5, **INK)
+            size = {"^": 8.0}.get(mark, 4.5)
+            yield _layer(places, mark, text, markersize=size, **HOLLOW)
+
+
+def _names(
+    machine: PlanarMachine, poses: Mapping[str, Array], rigid: Mapping[str, Array]
+) -> Iterator[Layer]:
+    """Names of bodies, cylinders and joints; those of one kind that are near are one text."""
+    points = _bodies(machine, poses)
+    along = {name: rigid.get(name, points[name]) for name in machine.bodies}
+    cylinders = {n: drive.of for n, drive in machine.drives.items() if isinstance(drive, Cylinder)}
+    ends = {n: [_placed(machine, poses, end) for end in of] for n, of in cylinders.items()}
+    kinds = (
+        ({n: p.mean(axis=0) for n, p in along.items()}, style.BLUE, (-6.0, -6.0, "right")),
+        ({n: np.mean(p, axis=0) for n, p in ends.items()}, style.VERMILION, (0.0, 9.0, "center")),
+        (
+            {n: _placed(machine, poses, joint.of[0]) for n, joint in machine.joints.items()},
+            style.INK,
+            (7.0, -3.0, "left"),
+        ),
+    )
+    near = NEAR * float(np.ptp(np.concatenate([*points.values()]), axis=0).max())
+    for places, colour, beside in kinds:
+        texts: list[tuple[str, float, float]] = []
+        for name, (x, y) in places.items():
+            k = next((k for k, t in enumerate(texts) if np.hypot(t[1] - x, t[2] - y) < near), None)
+            if k is None:
+                texts.append((name, x, y))
+            else:
+                texts[k] = (f"{texts[k][0]}\n{name}", *texts[k][1:])
+        rows = [(*text, *beside) for text in texts]
+        frame = pd.DataFrame(rows, columns=["text", "x", "y", "dx", "dy", "side"])
+        if rows:
+            look = {"fontsize": 8.5, "color": colour}
+            yield Layer(frame, "x", "y", "text", text="text", look=look)
 
 
 def _bodies(machine: PlanarMachine, poses: Mapping[str, Array]) -> dict[str, Array]:

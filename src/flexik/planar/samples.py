@@ -18,8 +18,9 @@ from flexik.machines.planar import PlanarMachine
 from flexik.multibody.flexible import FlexibleMachine
 from flexik.multibody.planar import solve
 from flexik.parameters.networks import Axis
+from flexik.planar.constants import model_inputs
 from flexik.planar.fields import FAILED, KEPT, LEFT_OUT, inputs, sample_fields
-from flexik.planar.machine import flexible, model_inputs
+from flexik.planar.machine import flexible
 from flexik.planar.section import PlanarSection, Selection
 
 Array = NDArray[np.float64]

@@ -16,6 +16,8 @@ from flexik.parameters.networks import Axis, Network, check_networks
 from flexik.parameters.section import CaseSection
 from flexik.planar.measured.campaign_file import own_campaign
 from flexik.planar.measured.section import Measured
+from flexik.positioning.beam_model import Passes, theory
+from flexik.positioning.beam_network import Settings as BeamNetwork
 from flexik.positioning.registry import Methods, check_methods
 
 Part = Annotated[float, Field(gt=0, lt=1)]
@@ -24,12 +26,23 @@ Part = Annotated[float, Field(gt=0, lt=1)]
 SAME = 1e-9
 # Places a side of the raster on which an area must have one that is reached
 RASTER = 40
+# Share of random targets below which too few of those drawn are reached, see planar.targets
+LEAST_SHARE = 0.05
 # Most samples of a grid
 MOST_SAMPLES = 10_000_000
+# Largest payload of samples over the machine's own mass: beyond these it is in another unit
+LIGHTEST, HEAVIEST = 0.002, 10.0
+# Largest payload that is tested, or selected by, over that of the grid
+LESS, MORE = 0.002, 2.0
 
 
 class Selection(Model):
-    """Random set that chooses among restarts."""
+    """Random set that chooses among restarts.
+
+    n_samples : drawn.
+    payload : least and largest, kg.
+    seed : of the drawing.
+    """
 
     n_samples: Count
     payload: tuple[NotNegative, NotNegative]
@@ -39,8 +52,10 @@ class Selection(Model):
 class Samples(Model):
     """Poses to learn from and to select by; left out are those with the tip behind a limit.
 
-    grid : values of every drive, m or rad, and of the payload, kg.
-    minimum_tip_x : m; None: there is no limit.
+    grid : values of every drive, m or rad, and of the `payload`, kg.
+    selection : random set that chooses among restarts.
+    minimum_tip_x : m; samples with the tip behind it are left out; not given: there is no limit.
+    maximum_failed_share : of samples without equilibrium; more fails the stage.
     """
 
     grid: dict[Name, Axis]
@@ -52,8 +67,12 @@ class Samples(Model):
 class OwnSamples(Model):
     """Samples of a file in place of a model's, see planar.own_samples.
 
+    file : CSV or Parquet, found from the folder of the project; a column for the coordinate of
+        each drive (DRIVE_stroke or DRIVE_angle), payload, tip_x and tip_y, with a unit in its
+        header, `boom_stroke (mm)`.
     columns : headers of the file, by the name of the column that they stand for.
-    selection_share, held_out_share : of the rows, drawn by `seed`; the others are learnt from.
+    selection_share, held_out_share : of the poses, drawn at random; the others are learnt from.
+    seed : of the division.
     """
 
     file: str
@@ -80,19 +99,53 @@ AnySamples = Annotated[
 ]
 
 
-class PlanarNetwork(Network):
-    """A network of a planar machine."""
+Learns = Literal[
+    "deflection",
+    "remainder",
+    "tip",
+    "rigid_tip",
+    "coordinates",
+    "target_shift",
+    "stroke_shift",
+    "payload_linear",
+    "payload_quadratic",
+]
 
-    learns: Literal["deflection", "tip", "rigid_tip", "coordinates"] | None = None
+
+class PlanarNetwork(Network):
+    """A network of a planar machine.
+
+    learns : deflection (flexible minus rigid tip); remainder (what beam theory leaves of it); tip;
+        rigid_tip; coordinates (from tip and payload; machines of two drives); target_shift or
+        stroke_shift (what the rigid inverse of the target lacks); payload_linear or
+        payload_quadratic (deflection as a polynomial of the payload); given unless it corrects
+        another.
+    n_passes : over the deformed pose, of the beam theory whose remainder it learns.
+    """
+
+    learns: Learns | None = None
+    n_passes: Passes = 2
+
+
+class CorrectionStudy(Model):
+    """Numbers of corrections of `methods`, on the first targets of random `conditions`."""
+
+    methods: Annotated[list[Name], Field(min_length=1)]
+    n_corrections: Annotated[list[Count], Field(min_length=1)] = [1, 2, 3, 5, 20]  # noqa: RUF012
+    conditions: Name = "workspace"
+    n_targets: Count = 500
 
 
 class Calibration(Model):
     """Constants of the machine that are free, by their dotted key in its file, SI units.
 
-    known : as somebody knows them.
-    ranges : of those that are fitted: one to `mean_error` (m) of the rigid inverse alone over
-        `conditions`, points or a name of params.yaml, or one and more to the tips of `campaign`, a
-        file with coordinates, see planar.measured.campaign_file.
+    known : values of those that are known.
+    ranges : least and largest value of those that are fitted: one to a mean error, or one and more
+        to a campaign.
+    mean_error : of the rigid inverse alone, m.
+    conditions : those of the mean error, points with payloads or the name of a set that is.
+    campaign : a CSV of measured tips at coordinates of the drives, in place of a mean error; see
+        planar.measured.campaign_file.
     """
 
     known: dict[str, Positive] = Field(default_factory=dict)
@@ -172,6 +225,14 @@ class PlanarSection(CaseSection):
             raise ValueError(f"calibration.conditions: there are no points {found!r}")
         return named
 
+    def base_of(self, name: str) -> dict[str, Any]:
+        """Settings of the beam theory whose remainder network `name` learns, if it does."""
+        network = self.networks[name]
+        if network.learns != "remainder":
+            return {}
+        # told here, where code is not counted: that of a theory concerns no other network
+        return {"theory": theory, "n_passes": network.n_passes}
+
     @model_validator(mode="after")
     def _fits_its_machine(self) -> Self:
         self._check_grid()
@@ -186,7 +247,15 @@ class PlanarSection(CaseSection):
             if len(network.layers) != 1:
                 raise ValueError(f"networks.{name}.n_hidden: expected one layer")
         check_methods(self.methods, self.networks)
-        if "none" not in self.methods:
+        for name, method in self.methods.items():
+            if isinstance(method, BeamNetwork):
+                learnt = self.networks[method.network or ""].n_passes
+                if method.n_passes != learnt:
+                    raise ValueError(
+                        f"methods.{name}.n_passes: {method.network!r} learns what {learnt} leave, "
+                        f"got {method.n_passes}"
+                    )
+        if "none" not in self.methods and isinstance(self.samples, Samples):
             raise ValueError("methods.none: expected, the others are compared with it")
         if taken := self.conditions.keys() & type(self.samples).model_fields.keys():
             raise ValueError(f"conditions.{min(taken)}: the name is taken")
@@ -205,10 +274,15 @@ class PlanarSection(CaseSection):
                 known = ", ".join([*drives, "payload"])
                 raise ValueError(f"samples.grid.{name}: unknown, expected one of {known}")
             low, high = drives[name].limits if name in drives else (0.0, np.inf)
-            if axis.minimum < low - SAME or axis.maximum > high + SAME:
-                raise ValueError(f"samples.grid.{name}: expected values from {low:g} to {high:g}")
+            key = f"samples.grid.{name}"
+            if axis.minimum < low - SAME:
+                raise ValueError(f"{key}.minimum: expected {low:g} or more, got {axis.minimum:g}")
+            if axis.maximum > high + SAME:
+                raise ValueError(f"{key}.maximum: expected {high:g} or less, got {axis.maximum:g}")
         if n_samples > MOST_SAMPLES:
-            raise ValueError(f"samples.grid: {n_samples:.3g} samples, at most {MOST_SAMPLES:.0g}")
+            raise ValueError(
+                f"samples.grid: expected {MOST_SAMPLES} samples or fewer, got {n_samples}"
+            )
 
 
 def check(section: PlanarSection) -> None:
@@ -221,6 +295,8 @@ def check(section: PlanarSection) -> None:
     except ValueError as error:
         raise ParameterError(f"{section.machine_file}: {error}") from None
     sets: dict[str, Any]
+    if isinstance(section.samples, Samples):
+        _check_payloads(section)
     sets = {f"conditions.{name}": given for name, given in section.conditions.items()}
     if isinstance(section.calibration.conditions, Points):
         sets["calibration.conditions"] = section.calibration.conditions
@@ -241,10 +317,45 @@ def check(section: PlanarSection) -> None:
                     f"params.yaml: {section.name}.{key}.points.{missed[0]}: the rigid machine does "
                     f"not reach ({x:g}, {y:g}) m{more}"
                 )
-        elif not _reached(section, _raster(section, given.x, given.y)).any():
+        elif (share := share_reached(section, given)) < LEAST_SHARE:
             raise ParameterError(
-                f"params.yaml: {section.name}.{key}: the machine reaches nothing in x, y"
+                f"params.yaml: {section.name}.{key}: the machine reaches {share:.1%} of x, y, "
+                f"expected {LEAST_SHARE:.0%} or more"
             )
+
+
+def share_reached(section: PlanarSection, area: Any) -> float:
+    """Share of the area `x`, `y` of random targets that the rigid machine reaches."""
+    return float(_reached(section, _raster(section, area.x, area.y)).mean())
+
+
+def payload_fault(largest: float, machine: PlanarMachine) -> str | None:
+    """What is wrong with the `largest` payload in kg of samples of `machine`, if anything."""
+    mass = sum(mass for _, _, mass in machine.masses().values())
+    if largest > HEAVIEST * mass:
+        other = f"{largest:g} g would be {largest / 1e3:g}"
+        return (
+            f"expected kg, {largest:g} is {largest / mass:.3g} times the machine's mass ({other})"
+        )
+    if 0 < largest < LIGHTEST * mass:
+        other = f"{largest:g} t would be {1e3 * largest:g}"
+        return f"expected kg, {largest:g} is nothing to a machine of {mass:.4g} ({other})"
+    return None
+
+
+def _check_payloads(section: PlanarSection) -> None:
+    """Raise ParameterError where payloads are in another unit, or far from those of the grid."""
+    of_grid = section.samples.grid["payload"].maximum
+    tested = {"samples.selection.payload": max(section.samples.selection.payload)}
+    for name, given in section.conditions.items():
+        key = "payloads" if isinstance(given, Points) else "payload"
+        tested[f"conditions.{name}.{key}"] = max(getattr(given, key))
+    for key, largest in {"samples.grid.payload.maximum": of_grid, **tested}.items():
+        fault = payload_fault(largest, section.machine)
+        if fault is None and (largest > MORE * of_grid or 0 < largest < LESS * of_grid):
+            fault = f"up to {largest:g} kg, expected about the grid's, up to {of_grid:g} kg"
+        if fault:
+            raise ParameterError(f"params.yaml: {section.name}.{key}: {fault}")
 
 
 def _reached(section: PlanarSection, points: np.ndarray) -> np.ndarray:

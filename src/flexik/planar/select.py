@@ -14,7 +14,7 @@ from flexik.machines.planar import PlanarMachine
 from flexik.parameters.trainers import Stopping
 from flexik.planar.learning import lesson
 from flexik.planar.section import PlanarSection
-from flexik.planar.train import data_inputs, described, part
+from flexik.planar.train import based_on, data_inputs, described, part
 
 CORRECTED = "corrected"
 
@@ -33,7 +33,7 @@ def parts(section: PlanarSection) -> list[Part]:
             "tolerance": network.select.tolerance,
             "trainer": section.trainers[network.select.trainer],
         }
-        inputs: dict[str, Any] = data_inputs(section)
+        inputs: dict[str, Any] = data_inputs(section, name)
         if network.corrects is not None:
             inputs["rigid"] = sizes / CORRECTED / f"{network.corrects}.json"
         found.append(Part(name, prepare, settings, inputs))
@@ -53,9 +53,10 @@ def prepare(
     grid: Path,
     selection: Path,
     rigid: Path | None = None,
+    **model: Any,
 ) -> Work:
-    """A size from one start is an item."""
-    corrected = None if rigid is None else load_network(rigid)[0]
+    """A size from one start is an item; `model` is what `based_on` takes."""
+    base = based_on(machine, **model) if rigid is None else load_network(rigid)[0]
     architecture = Architecture(sizes[0], activation)
-    taught = lesson(kind, architecture, trainer, seed, machine, grid, selection, corrected)
+    taught = lesson(kind, architecture, trainer, seed, machine, grid, selection, base)
     return select(taught, sizes, n_restarts, tolerance)

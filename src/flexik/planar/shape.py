@@ -11,7 +11,8 @@ from flexik.machines.planar import PlanarMachine
 from flexik.machines.sections import Array
 from flexik.multibody.flexible import FlexibleMachine
 from flexik.multibody.planar import shapes, tips
-from flexik.planar.machine import flexible, model_inputs
+from flexik.planar.constants import model_inputs
+from flexik.planar.machine import flexible
 from flexik.planar.section import PlanarSection
 
 
@@ -43,20 +44,22 @@ def drawn(machine: FlexibleMachine, values: Array, payload: float) -> dict[str, 
     """What planar.picture draws of coordinates `values` (k,) with `payload` in kg.
 
     values, payload; reference and beams, node positions (m, 2) in m by beam, rigid and loaded;
-    poses (3,) in m and rad by body; rigid_tip and tip (2,) in m.
+    poses (3,) in m and rad by body; rigid_tip, own_weight_tip (without payload) and tip (2,) in m.
     """
     rigid, bent = shapes(machine, values, payload)
     poses = machine.linkage.poses(values[None])[0]
     body, (x, y) = machine.machine.located(machine.machine.payload)
     px, py, angle = poses[machine.linkage.names.index(body)]
     c, s = np.cos(angle), np.sin(angle)
+    under_own_weight, loaded = tips(machine, np.tile(values, (2, 1)), np.array([0.0, payload]))
     return {
         "values": values.tolist(),
         "payload": payload,
         "beams": {name: _rounded(nodes) for name, nodes in bent.items()},
         "reference": {name: _rounded(nodes) for name, nodes in rigid.items()},
         "poses": dict(zip(machine.linkage.names, map(_rounded, poses), strict=True)),
-        "tip": _rounded(tips(machine, values[None], np.array([payload]))[0]),
+        "tip": _rounded(loaded),
+        "own_weight_tip": _rounded(under_own_weight),
         "rigid_tip": _rounded(np.array([px + c * x - s * y, py + s * x + c * y])),
     }
 

@@ -16,8 +16,9 @@ from flexik.machines.planar import PlanarMachine
 from flexik.multibody.flexible import FlexibleMachine
 from flexik.multibody.planar import solve
 from flexik.parameters.conditions import RandomTargets
+from flexik.planar.constants import model_inputs
 from flexik.planar.fields import target_fields
-from flexik.planar.machine import flexible, model_inputs
+from flexik.planar.machine import flexible
 from flexik.planar.section import PlanarSection
 
 ROWS = 400

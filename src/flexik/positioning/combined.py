@@ -23,6 +23,11 @@ from flexik.positioning.method import (
     take_network,
 )
 
+# Corrections end where the predicted deflection changed by less, m
+CONVERGED = 1e-9
+# Corrections that do: near a fold of the linkage they shrink slowly
+MOST_CORRECTIONS = 50
+
 
 class Settings(method.Settings):
     """See Combined; genetic: the rigid inverse by a genetic algorithm; None: in closed form."""
@@ -40,8 +45,8 @@ class Combined:
     manipulator : its inverse is used before and after the correction.
     network : predicts the deflection (flexible minus rigid tip, m) from actuator coordinates and
         payload (kg).
-    n_corrections : one as published; more iterate towards coordinates whose own deflection is the
-        one corrected.
+    n_corrections : at most; one as published; more iterate towards coordinates whose own deflection
+        is the one corrected.
 
     A row that the inverse fails in any pass keeps the coordinates it had and the first failing
     status. Diagnostics: those of the inverse with the prefixes `first_` and `corrected_` (the last
@@ -56,17 +61,23 @@ class Combined:
         """See `flexik.positioning.method.Method`."""
         targets, payload = planar(query)
         first = rigid_inverse(self.manipulator, targets, current)
-        last, values, status = first, first.values, first.status
-        for _ in range(self.n_corrections):
-            inputs = np.column_stack([values, payload])
-            deflection = checked(
-                "predicted deflection", self.network.predict(inputs), *targets.shape
-            )
-            last = self.manipulator.inverse(targets - deflection, values, targets)
-            status = np.where(status == REACHED, last.status, status)
-            values = np.where((status == REACHED)[:, None], last.values, values)
+        values, status = first.values.copy(), first.status.copy()
+        deflection, rows = np.zeros_like(targets), np.arange(len(targets))
         diagnostics = {f"first_{name}": found for name, found in first.diagnostics.items()}
-        diagnostics |= {f"corrected_{name}": found for name, found in last.diagnostics.items()}
+        for _ in range(self.n_corrections):
+            inputs, goal = np.column_stack([values[rows], payload[rows]]), targets[rows]
+            found = checked("predicted deflection", self.network.predict(inputs), *goal.shape)
+            last = self.manipulator.inverse(goal - found, values[rows], goal)
+            for name, of_rows in last.diagnostics.items():
+                diagnostics.setdefault(f"corrected_{name}", of_rows.copy())[rows] = of_rows
+            moved = np.abs(found - deflection[rows]).max(axis=1) > CONVERGED
+            deflection[rows] = found
+            status[rows] = np.where(status[rows] == REACHED, last.status, status[rows])
+            reached = status[rows] == REACHED
+            values[rows[reached]] = last.values[reached]
+            rows = rows[moved & reached]
+            if not len(rows):
+                break
         diagnostics |= {"deflection_x": deflection[:, 0], "deflection_y": deflection[:, 1]}
         return Answer(values, status, diagnostics)
 

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from flexik.datasets.tables import Field
 from flexik.errors import FlexikError
 from flexik.kinematics.manipulator import Manipulator, RigidSolution
+from flexik.machines.planar import PlanarMachine
 from flexik.parameters.model import Count, Model, Name
 
 Array = NDArray[np.float64]
@@ -88,14 +89,16 @@ class Settings(Model):
     A file of this room that has a class `Settings` with its name as `method` and a function
     `build(settings, ingredients)` is a method, see positioning.registry.
 
-    needs : word that the network must have learnt (deflection, tip, coordinates, correction);
-        None: it needs none.
+    needs : word that the network must have learnt (deflection, tip, coordinates, correction,
+        remainder); None: it needs none.
+    asks_machine : whether it asks the machine itself, beyond its rigid kinematics.
     reads : tables of samples that it is built from.
     network : name of the network it is built from.
     n_targets : the most random targets it is judged on; None: all.
     """
 
     needs: ClassVar[str | None] = None
+    asks_machine: ClassVar[bool] = False
     reads: ClassVar[tuple[str, ...]] = ()
     method: str
 
@@ -109,11 +112,13 @@ class Ingredients:
 
     network : the trained one that the settings name.
     samples : tables of samples by name, those of `reads` of the settings.
+    machine : all constants known; None: there is no flexible model.
     """
 
     manipulator: Manipulator
     network: Network | None = None
     samples: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+    machine: PlanarMachine | None = None
 
 
 def take_network(ingredients: Ingredients) -> Network:
@@ -121,6 +126,13 @@ def take_network(ingredients: Ingredients) -> Network:
     if ingredients.network is None:
         raise PositioningError("the method needs a network, got none")
     return ingredients.network
+
+
+def take_machine(ingredients: Ingredients) -> PlanarMachine:
+    """The machine of `ingredients`; raises PositioningError if there is none."""
+    if ingredients.machine is None:
+        raise PositioningError("the method needs a flexible machine, got none")
+    return ingredients.machine
 
 
 def planar(query: Array) -> tuple[Array, Array]:

@@ -2,6 +2,7 @@
 
 import importlib
 import pkgutil
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Union
@@ -58,6 +59,12 @@ Methods = Annotated[dict[Name, AnyMethod], BeforeValidator(_with_method)]
 def build_of(settings: Settings) -> Build:
     """The function that builds the method of `settings`."""
     return METHODS[settings.method][1]
+
+
+def about(settings: Settings) -> str:
+    """What the method of `settings` is, in a sentence: that of its file, without its name."""
+    first = (sys.modules[type(settings).__module__].__doc__ or "").partition("\n\n")[0]
+    return " ".join(first.partition(": ")[2].split()).rstrip(".")
 
 
 def check_methods(methods: Mapping[str, Settings], networks: Mapping[str, Network]) -> None:

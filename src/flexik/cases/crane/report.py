@@ -15,6 +15,7 @@ from flexik.cases.crane.section import Section
 from flexik.evaluation.errors import STATISTICS
 from flexik.kinematics.status import REACHED, STATUS_MEANING
 from flexik.planar.samples import counts
+from flexik.positioning.registry import about
 from flexik.reporting.report import Content, write_case
 from flexik.reporting.style import MM
 
@@ -80,6 +81,7 @@ def values(results: Results) -> dict[str, Any]:
         "results": results,
         "section": section,
         "methods": methods,
+        "about": {label: about(method) for label, method in section.methods.items()},
         "of_published_size": all(
             section.networks[name].n_hidden == results.published_size(name) for name in used
         ),

@@ -21,6 +21,14 @@ ERROR_ROWS = {"error_x": "dX (mm)", "error_y": "dY (mm)", "error": "R (mm)"}
 CELL = 0.25  # m, side of a square of the error map
 # Variants of a method have its hue
 VARIANTS = ("_selected", "_ga", "_gauss_newton")
+# Methods by their group, in the figure of accuracy and cost
+FAMILIES = {
+    "published": "of the thesis",
+    "selected": "the same, sizes by selection error",
+    "variants": "variants",
+    "beyond": "beyond the thesis",
+}
+FAMILY_COLOURS = (style.VERMILION, style.ORANGE, style.GREY, style.BLUE)
 
 
 def figures(results: Results) -> dict[str, Drawing]:
@@ -147,11 +155,12 @@ def _initial_positions(results: Results) -> Drawing:
 
 
 def _errors(results: Results) -> dict[str, Drawing]:
-    looks = style.looks(("none", *results.methods), VARIANTS)
-    variants = results.groups["variants"]
-    shown = {k: f for k, f in results.workspace.items() if len(f) and k not in variants}
+    looks, groups = style.looks(("none", *results.methods), VARIANTS), results.groups
+    names = ["none", *groups["published"], *groups["selected"], results.best]
+    shown = {name: results.workspace[name] for name in names}
     over_workspace = pd.concat(shown, names=["method"]).reset_index(level="method")
     found = {
+        "accuracy_and_cost": _accuracy(results.compare()),
         "method_comparison": _comparison(results),
         "error_map": draw(
             plane.maps,
@@ -169,12 +178,42 @@ def _errors(results: Results) -> dict[str, Drawing]:
             results.tolerances, results.published["tolerance_study"], looks
         ),
     }
-    for label in results.methods:
+    for label in (*groups["published"], *groups["selected"], *groups["variants"]):
         found[f"positioning_errors_{label}"] = _positioning_errors(
             results.errors["none"], results.errors[label], label
         )
     cost = results.query_cost().drop(columns="published").dropna()
     return found | ({"query_cost": _cost(cost, looks)} if len(cost) else {})
+
+
+def _accuracy(compared: pd.DataFrame) -> Drawing:
+    """Error at random targets against time and memory, all methods; those of the thesis apart."""
+    costs = {"microseconds": "a query in a batch (us)", "kilobytes": "numbers (kB)"}
+    frames = []
+    for panel in costs:
+        known = compared[compared["method"] != "none"].dropna(subset=[panel])
+        frames.append(known[known[panel] > 0].assign(cost=known[panel], panel=panel))
+    frame = pd.concat(frames)
+    frame["kind"] = frame["group"].map(FAMILIES)
+    if frame.empty:
+        return draw(chart, Layer(frame, "cost", "workspace_mean", "o"), x=X, y=Y)
+    names = frame.assign(text=frame["method"].str.replace("_", " "), dx=5.0, dy=4.0, side="left")
+    colours = {
+        name: {"color": c} for name, c in zip(FAMILIES.values(), FAMILY_COLOURS, strict=True)
+    }
+    return draw(
+        chart,
+        Layer(frame, "cost", "workspace_mean", "o", "kind", look={"markersize": 7.0}),
+        Layer(names, "cost", "workspace_mean", "text", text="text", look={"fontsize": 7.0}),
+        x={panel: Axis(label, log=True, margin=0.15) for panel, label in costs.items()},
+        y=Axis("mean error at random targets (mm)", MM, log=True),
+        panel="panel",
+        panels=tuple(costs),
+        titles="",
+        columns=2,
+        height=6.0,
+        looks=colours,
+    )
 
 
 def _comparison(results: Results) -> Drawing:

@@ -39,6 +39,7 @@ KIND = {
     None: "correction",
 }
 SELECTED = "_selected"
+GROUPS = ("published", "selected", "beyond", "variants")
 TIMES = {"single (us)": "microseconds_single", "batched (us)": "microseconds_batched"}
 STEPS = {
     "gradient_descent": inversion_step_operations,
@@ -56,6 +57,7 @@ class Results:
     published : values of the thesis by file, errors in mm.
     training : a row for every restart of every network.
     studies : frame of learning.size_selection.by_size, and the chosen size, by network.
+    by_corrections, draws : tables of planar.corrections and of parts.points.
     query_times, training_curves : measured by benchmarks.
     """
 
@@ -73,6 +75,8 @@ class Results:
     trained: Mapping[str, Network]
     tolerances: pd.DataFrame
     fitting: pd.DataFrame
+    by_corrections: pd.DataFrame
+    draws: pd.DataFrame
     query_times: pd.DataFrame
     training_curves: pd.DataFrame
     shape: Mapping[str, Any]
@@ -124,15 +128,67 @@ class Results:
 
     @property
     def groups(self) -> dict[str, list[str]]:
-        """Methods that share a table: of published size, of selected size, other variants.
+        """Methods that share a table: of published size, of selected size, variants, and beyond.
 
-        The first are those with the name of their method, the second end with SELECTED.
+        The first are the thesis' with the name of their method, the second end with SELECTED; the
+        last are of methods that the thesis does not know.
         """
-        groups: dict[str, list[str]] = {"published": [], "selected": [], "variants": []}
+        groups: dict[str, list[str]] = {name: [] for name in GROUPS}
+        published = self.published["positioning_errors"]
         for label, method in self.methods.items():
             names = {method.method: "published", f"{method.method}{SELECTED}": "selected"}
-            groups[names.get(label, "variants")].append(label)
+            known = method.method in published
+            groups[names.get(label, "variants") if known else "beyond"].append(label)
         return groups
+
+    @property
+    def best(self) -> str:
+        """The method of the least mean error at random targets, the flexible model itself aside."""
+        found = self.workspace_statistics
+        names = [name for name in self.methods if name in found and name != "exact"]
+        return min(names, key=lambda name: found[name]["mean_error"])
+
+    def memory(self, label: str) -> int:
+        """Numbers that a controller needs of method `label`, as float64, in bytes.
+
+        Weights of its network, samples of its table, sections of its beams; none of the rigid
+        kinematics, which all need.
+        """
+        method, machine = self.section.methods[label], self.section.machine
+        n = 0
+        if method.network is not None:
+            n += sum(matrix.size for matrix in self.trained[method.network].weights)
+        elif method.reads:
+            n += 2 * len(self.grid)
+        if method.asks_machine:
+            profiles = [beam.profile() for beam in machine.beams.values()]
+            n += sum(3 * len(profile.abscissa) for profile in profiles)
+        return 8 * n
+
+    def compare(self) -> pd.DataFrame:
+        """A row a method: errors at published conditions and at random targets, and its cost."""
+        published = self.published["positioning_errors"].set_index("statistic")
+        groups = {label: name for name, labels in self.groups.items() for label in labels}
+        times = self.query_times.set_index("method")
+        rows = []
+        for label, found in self.statistics.items():
+            at_random = self.workspace_statistics[label]
+            row = {
+                "method": label,
+                "group": groups.get(label, "published"),
+                "mean": found["mean_error"],
+                "max": found["max_error"],
+                "thesis": published[label]["mean_error"] / MM if label in published else None,
+                "workspace_mean": at_random["mean_error"],
+                "workspace_p99": at_random["p99_error"],
+                "workspace_max": at_random["max_error"],
+                "n_failed": at_random["n_failed"],
+                "n_targets": at_random["n_targets"],
+                "kilobytes": self.memory(label) / 1e3,
+                "microseconds": times["microseconds_batched"].get(label),
+            }
+            rows.append(row)
+        return pd.DataFrame(rows)
 
     def published_size(self, name: str) -> int | None:
         """Published n_hidden of networks that learn what network `name` does, if there is one."""
@@ -204,6 +260,8 @@ def read(section: Section) -> Results:
         trained={name: load_network(data / f"networks/{name}.json")[0] for name in networks},
         tolerances=read_table(data / "studies/tolerance.parquet"),
         fitting=read_table(data / "studies/fitting.parquet"),
+        by_corrections=read_table(data / "studies/corrections.parquet"),
+        draws=read_table(data / "studies/points.parquet"),
         query_times=times[times["settings"] == keys],
         training_curves=read_csv(
             BENCHMARKS / "training_methods.csv", ("seconds", "error"), ("trainer",)

@@ -67,6 +67,27 @@ INVERSIONS = {
     "single (us)": Column("single (us)", 0),
     "batched (us)": "batched (us)",
 }
+METHODS = {
+    "method": "method",
+    "mean R (mm)": mm("mean", 4),
+    "max R (mm)": mm("max", 3),
+    "thesis, mean R (mm)": mm("thesis", 2),
+    "at random: mean (mm)": mm("workspace_mean", 4),
+    "99 % (mm)": mm("workspace_p99", 3),
+    "max (mm)": mm("workspace_max", 3),
+    "failed": "n_failed",
+    "targets": "n_targets",
+    "numbers (kB)": Column("kilobytes", 2),
+    "a query (us)": Column("microseconds", 1),
+}
+CORRECTIONS = {
+    "method": "method",
+    "corrections": "n_corrections",
+    "mean (mm)": mm("mean_error", 4),
+    "99 % (mm)": mm("p99_error", 3),
+    "max (mm)": mm("max_error", 3),
+    "failed": "n_failed",
+}
 TOLERANCES = {
     "method": "method",
     "tolerance": "tolerance",
@@ -88,6 +109,9 @@ def tables(results: Results) -> dict[str, Table]:
     training = results.training.rename(columns=lambda name: str(name).replace("_", " "))
     workspace = [{"method": k, **found} for k, found in results.workspace_statistics.items()]
     return {
+        "methods": table(results.compare(), METHODS),
+        "corrections": table(results.by_corrections, CORRECTIONS),
+        "points": _draws(results.draws),
         "positioning_errors": _errors(results, ["none", *groups["published"]]),
         "positioning_errors_selected": _errors(results, groups["selected"]),
         "positioning_errors_variants": _errors(results, groups["variants"]),
@@ -115,6 +139,18 @@ def _errors(results: Results, labels: list[str]) -> Table:
     errors = errors.T
     errors.insert(0, "statistic", errors.index.map(STATISTIC_NAMES | COUNT_NAMES))
     return Table(errors)
+
+
+def _draws(draws: pd.DataFrame) -> Table:
+    """Median and range over the draws of what is reported of one of them."""
+    rows = []
+    for name, of_method in draws.groupby("method", sort=False):
+        row: dict[str, Any] = {"method": name, "draws": len(of_method)}
+        for what in ("mean", "max"):
+            found = spread(MM * of_method[f"{what}_error"])
+            row |= {f"{which} {what} R (mm)": value for which, value in found.items()}
+        rows.append(row)
+    return Table(pd.DataFrame(rows))
 
 
 def calibration(results: Results) -> Table:

@@ -8,10 +8,19 @@ from pydantic import Field, model_validator
 from flexik.kinematics.crane import CraneGeometry
 from flexik.kinematics.machine_file import crane_geometry
 from flexik.parameters.conditions import Points, RandomTargets, check_different
-from flexik.parameters.model import Count, Model, Name, NotNegative, Positive, Seed
+from flexik.parameters.model import (
+    Count,
+    Interval,
+    Model,
+    Name,
+    NotNegative,
+    Positive,
+    Seed,
+    Vector,
+)
 from flexik.planar import section as planar
 from flexik.planar.measured.section import Measured
-from flexik.planar.section import SAME, PlanarSection, check
+from flexik.planar.section import SAME, CorrectionStudy, PlanarSection, check
 from flexik.positioning.inverted_network import InvertedSettings
 
 __all__ = ["Section", "check"]
@@ -29,6 +38,10 @@ PUBLISHED = Points(
     ],
     payloads=[30.0, 120.0, 260.0, 310.0, 470.0],
 )
+
+
+# Mean error without compensation, m, data/reference/crane/positioning_errors.csv
+PUBLISHED_MEAN = 31.9331e-3
 
 
 class Calibration(planar.Calibration):
@@ -84,9 +97,25 @@ class ToleranceStudy(Model):
         return self
 
 
+class PointStudy(Model):
+    """Test points drawn anew: those `named` in the thesis, and whole metres of the area x, y.
+
+    methods : those that are judged on each draw, besides `none`.
+    """
+
+    named: Annotated[list[Vector], Field(min_length=1)]
+    x: Interval = (1.0, 6.0)
+    y: Interval = (-4.0, 7.0)
+    methods: Annotated[list[Name], Field(min_length=1)]
+    n_draws: Annotated[Count, Field(le=10_000)] = 100
+    seed: Seed = 4
+
+
 class Studies(Model):
     """What varies one thing."""
 
+    corrections: CorrectionStudy
+    points: PointStudy
     mesh: MeshStudy
     shape: Shape
     fitting: Fitting
@@ -150,6 +179,15 @@ class Section(PlanarSection):
             raise ValueError(f"studies.fitting.trainer: there is no trainer {fitting.trainer!r}")
 
     def _check_methods(self) -> None:
+        for key, names in (
+            ("corrections.methods", self.studies.corrections.methods),
+            ("points.methods", self.studies.points.methods),
+        ):
+            for number, name in enumerate(names):
+                if name not in self.methods:
+                    raise ValueError(f"studies.{key}.{number}: there is no method {name!r}")
+        if self.studies.corrections.conditions not in self.conditions:
+            raise ValueError("studies.corrections.conditions: there are no such conditions")
         needed = {
             f"tolerance.methods.{number}": (name, InvertedSettings)
             for number, name in enumerate(self.studies.tolerance.methods)

@@ -27,7 +27,7 @@ from flexik.planar.measured.report import (
     offset_table,
     prediction_table,
 )
-from flexik.planar.picture import picture
+from flexik.planar.picture import moved, picture
 from flexik.planar.samples import counts
 from flexik.planar.section import OwnSamples
 from flexik.reporting import kinds, plane, style
@@ -285,6 +285,7 @@ def values(results: Results) -> dict[str, Any]:
     of_all = _distances(results) if results.held_out else results.statistics[judged]
     rows = of_all.set_index("method")
     best = rows["mean_error"].idxmin()
+    asks = [name for name, given in results.section.methods.items() if given.network]
     return {
         "own": results.section.samples if results.held_out else None,
         "rigid": RIGID,
@@ -293,10 +294,13 @@ def values(results: Results) -> dict[str, Any]:
         "judged": judged,
         "random": random,
         "best": best,
+        "leads": {key: rows[f"{key}_error"].idxmin() for key in ("mean", "p99", "max")},
+        "asks_network": asks,
+        "best_network": rows.loc[asks, "mean_error"].idxmin() if asks else None,
         "rows": rows.to_dict("index"),
         "counted": {name: counts(frame) for name, frame in results.samples.items()},
         "mass": sum(mass for _, _, mass in results.section.machine.masses().values()),
-        "sag": float(np.hypot(*np.subtract(results.shape["tip"], results.shape["rigid_tip"]))),
+        "moved": moved(results.shape),
         "shape": results.shape,
         "measured": results.section.measured,
         "adapted": _adapted_said(results.adapted),

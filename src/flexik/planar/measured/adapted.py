@@ -120,11 +120,14 @@ class Nominal:
         return known.linkage.tip(poses)[0], np.concatenate([found.point, found.coordinate], axis=2)
 
 
-def closed(machine: FlexibleMachine, values: Array) -> Array:
-    """Poses (n, b, 3); raises PositioningError where the linkage does not close."""
+def closed(machine: FlexibleMachine, values: Array, n_samples: int | None = None) -> Array:
+    """Poses (n, b, 3); raises PositioningError where the linkage does not close.
+
+    n_samples : after so many rows those of the same samples come again; not given: they do not.
+    """
     poses = machine.linkage.poses(values)
     if (broken := np.isnan(poses).any(axis=(1, 2))).any():
-        row = int(np.argmax(broken))
+        row = int(np.argmax(broken)) % (n_samples or len(values))
         raise PositioningError(
             f"measurements: sample {row}: the linkage does not close at {values[row]} m or rad"
         )
@@ -275,13 +278,14 @@ def whitening(known: FlexibleMachine, measurements: Measurements, nominal: Nomin
     expected, machine = nominal.expected, known.machine
     turns = np.array([drive.kind == "revolute" for drive in machine.drives.values()])
     repeats = np.where(turns, expected.angle_repeatability, expected.repeatability)
-    scatter = [repeats * compliance(machine, closed(known, values), payload).coordinate]
-    zeros = nominal.prior.deviations[nominal.n_dimensions - len(turns) : nominal.n_dimensions]
-    for doubt in np.diag(zeros):
-        less, more = (
-            compliance(machine, closed(known, shifted), payload).play.sum(axis=2)
-            for shifted in (values - doubt, values + doubt)
-        )
+    doubt = np.diag(nominal.prior.deviations[: nominal.n_dimensions][-len(turns) :])
+    # all at once: as commanded, and with every zero a deviation less and more
+    shifts = np.vstack([np.zeros(len(turns)), -doubt, doubt])
+    shifted = (values + shifts[:, None]).reshape(-1, len(turns))
+    found = compliance(machine, closed(known, shifted, len(values)), np.tile(payload, len(shifts)))
+    play = np.split(found.play.sum(axis=2), len(shifts))
+    scatter = [repeats * found.coordinate[: len(values)]]
+    for less, more in zip(play[1 : len(turns) + 1], play[len(turns) + 1 :], strict=True):
         scatter.append(expected.play * (more - less)[..., None] / 2)
     whole = np.concatenate(scatter, axis=2)
     covariance = whole @ whole.transpose(0, 2, 1) + expected.measurement**2 * np.eye(2)

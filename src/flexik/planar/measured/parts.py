@@ -3,7 +3,7 @@
 from typing import Any
 
 from flexik.datasets.parts import Part
-from flexik.planar.machine import model_inputs
+from flexik.planar.constants import model_inputs
 from flexik.planar.measured import adaptation, budget, campaign, identified
 from flexik.planar.measured.section import Measured
 from flexik.planar.methods import method_settings

@@ -25,7 +25,9 @@ class Campaign(Points):
 
     file : a CSV of one's own takes its place, see planar.measured.campaign_file
     method : compensates; of kind combined, of the nominal machine
-    noise : standard deviation of a measured coordinate, m
+    noise : standard deviation of a measured coordinate, m; that of the thesis, chapter 4.6
+    deviations : how far machines as built may be off
+    seed : of the machine that is measured
     """
 
     file: str | None = None
@@ -44,21 +46,42 @@ class Campaign(Points):
 
 
 class Budget(Model):
-    """The campaign on machines with one kind of deviation, or `factor` times as much of it."""
+    """The campaign on machines with one kind of deviation, or more of it.
+
+    n_twins : machines as built
+    factor : how many times as large a deviation is
+    """
 
     n_twins: Count
     factor: Annotated[float, Field(gt=1, le=10)]
 
 
 class Misjudged(Model):
-    """An adaptation to expectations that are too small."""
+    """An adaptation to expectations that are too small.
+
+    share : of the deviations that are expected
+    n_measurements : how many are learnt from, of those of the adaptation
+    """
 
     share: Annotated[float, Field(gt=0, le=1)]
     n_measurements: list[Count]
 
 
 class Adaptation(Model):
-    """Machines (n_twins) that are adapted, measurements for it, and targets to judge by."""
+    """Machines as built that are adapted, measurements for it, and targets to judge by.
+
+    method : what is corrected, of kind combined
+    n_twins : machines as built
+    n_measurements : how many are learnt from, in increasing order
+    n_targets : others, to judge by, on each machine
+    x, y : area of measurements and targets, m
+    payload : least and largest, kg
+    n_corrections : of the adapted method; play changes sides with the coordinates, so more than
+        one pays
+    expected : deviations that are expected before measuring
+    misjudged : again by one who expects too little; not given: nobody does
+    seed : of the first machine
+    """
 
     method: Name
     n_twins: Count
@@ -86,7 +109,12 @@ class Adaptation(Model):
 
 
 class Measured(Model):
-    """Studies of a measured machine (Rouvinen 1999, chapter 4.6); budget: None: there is none."""
+    """Studies of a measured machine (Rouvinen 1999, chapter 4.6).
+
+    campaign : what is measured
+    budget : what each deviation does; not given: nothing is told of it
+    adaptation : correcting the compensator by a few measurements
+    """
 
     campaign: Campaign
     budget: Budget | None = None

@@ -24,9 +24,9 @@ from flexik.learning.perceptron import Network, quantities
 from flexik.learning.training import Architecture, Lesson, train
 from flexik.machines.planar import PlanarMachine
 from flexik.multibody.planar import tips
+from flexik.planar.constants import model_inputs
 from flexik.planar.fields import deflection, inputs, kept, sample_fields
 from flexik.planar.learning import kind_of
-from flexik.planar.machine import model_inputs
 
 FIELDS = (
     Field("n_hidden", "1", "neurons in the hidden layer", "int64"),

@@ -16,7 +16,7 @@ from flexik.kinematics.crane import forward
 from flexik.machines.planar import PlanarMachine
 from flexik.multibody.elements import ELEMENTS
 from flexik.multibody.planar import tips
-from flexik.planar.machine import model_inputs
+from flexik.planar.constants import model_inputs
 from flexik.planar.samples import Samples, random_samples
 
 FIELDS = (

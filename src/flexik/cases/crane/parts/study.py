@@ -1,9 +1,9 @@
 """What varies one thing: mesh, shape, size of a network, tolerance, and the crane as built."""
 
-from flexik.cases.crane.parts import fitting, mesh, tolerance
+from flexik.cases.crane.parts import fitting, mesh, points, tolerance
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part
-from flexik.planar import shape
+from flexik.planar import corrections, shape
 from flexik.planar.measured.parts import measured_parts
 
 
@@ -11,5 +11,6 @@ def parts(section: Section) -> list[Part]:
     """The studies of the nominal crane, then those of the measured one."""
     shown = section.studies.shape
     drawn = shape.part(section, shown.strokes, shown.payload)
-    nominal = [study.part(section) for study in (mesh, fitting, tolerance)]
+    nominal = [study.part(section) for study in (mesh, fitting, tolerance, points)]
+    nominal.append(corrections.part(section, section.studies.corrections))
     return [drawn, *nominal, *measured_parts(section, section.studies.measured)]

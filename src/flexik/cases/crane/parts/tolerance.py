@@ -18,7 +18,8 @@ from flexik.machines.planar import PlanarMachine
 from flexik.multibody.planar import tips
 from flexik.parameters.conditions import Points
 from flexik.planar.conditions import at_points
-from flexik.planar.machine import columns_of, model_inputs
+from flexik.planar.constants import model_inputs
+from flexik.planar.machine import columns_of
 from flexik.planar.methods import method_inputs, method_settings, trained_method
 from flexik.positioning.method import Columns, Method
 
