@@ -7,7 +7,8 @@ from pathlib import Path
 import pandas as pd
 
 from flexik.cases.case import load
-from flexik.cases.crane.parts.crane import on_spring
+from flexik.cases.crane.parts.crane import FlexibleCrane
+from flexik.cases.crane.section import SPRING as SPRING_KEY
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.machines.deviations import Magnitudes
 from flexik.planar.fields import inputs, sample_fields, target_fields
@@ -28,7 +29,7 @@ def section():
 def crane(stiffness=SPRING):
     """The flexible crane."""
     with contextlib.chdir(ROOT):  # sections are named relative to the project
-        found = on_spring(section().machine, stiffness)
+        found = FlexibleCrane(section().machine.with_constants({SPRING_KEY: stiffness}))
         found.beams  # noqa: B018  they are read
         return found
 
@@ -46,6 +47,13 @@ NAMES = ("deflection", "tip", "rigid_tip", "correction", "coordinates")
 KINDS = {name: kind_of(MACHINE, name) for name in NAMES}
 
 
+SIZES = (
+    *("pivot", "length", "play", "play_spread", "stroke_offset"),
+    *("repeatability", "section", "spring"),
+)
+
+
 def magnitudes(*sizes):
     """How far a crane may be off, whatever the sizes."""
-    return Magnitudes.model_construct(**dict(zip(Magnitudes.model_fields, sizes, strict=True)))
+    given = dict(zip(SIZES, sizes, strict=True))
+    return Magnitudes.model_construct(**given, angle_offset=0.0, angle_repeatability=0.0)

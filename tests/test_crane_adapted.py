@@ -7,35 +7,21 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from flexik.cases.crane.measured_section import Expected
-from flexik.cases.crane.parts.measured.adapted import (
-    DIMENSIONS,
-    JOINTS,
-    OFFSETS,
-    PLAYS,
-    Adapted,
-    CorrectedDeflection,
-    Measurements,
-    Offsets,
-    identify,
-    misjudged,
-    predicted_tip,
-    prior,
-    surprise,
-)
-from flexik.cases.crane.parts.measured.fields import MEASURED, STROKES
-from flexik.cases.crane.parts.measured.predictions import (
-    misfit,
-    outliers,
-    predictions,
-)
+from flexik.cases.crane.section import SPRING
 from flexik.kinematics.crane import forward, inverse_with_smallest_extension
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.status import REACHED
+from flexik.machines.deviations import Expected
 from flexik.multibody.as_built import as_built_tips, draw_twin
 from flexik.multibody.joint_forces import compliance, joint_forces, pins_of
 from flexik.multibody.model import PlanarModel
 from flexik.multibody.planar import tips
+from flexik.planar.measured import adapted
+from flexik.planar.measured.adapted import Measurements, Nominal, Offsets, misjudged
+from flexik.planar.measured.fields import MEASURED, values_of
+from flexik.planar.measured.offsets import dimensions_of, offsets_of
+from flexik.planar.measured.predictions import misfit, outliers
+from flexik.planar.measured.predictions import predictions as predictions_of
 from flexik.positioning.combined import Combined
 from flexik.positioning.method import PositioningError
 
@@ -50,6 +36,11 @@ SETTINGS = Expected(
     section=0.05,
     spring=0.1,
 )
+MACHINE = crane_case.crane().machine
+OFFSETS = [offset.name for offset in offsets_of(MACHINE, SETTINGS)]
+DIMENSIONS = [offset.name for offset in dimensions_of(MACHINE, SETTINGS)]
+PLAYS = [name for name in OFFSETS if name.endswith(".play")]
+STROKES = values_of(MACHINE)
 POSES = np.array([[0.1, 0.1, 0.0], [0.3, 0.3, 0.5], [0.2, 0.5, 1.2], [0.45, 0.6, 0.3]])
 LOADS = np.array([0.0, 86.0, 172.0, 470.0])
 
@@ -82,8 +73,28 @@ def changed(**values):
     return SETTINGS.model_copy(update=values)
 
 
-def offsets_of(**values):
+def with_offsets(values):
     return Offsets(np.array([values.get(name, 0.0) for name in OFFSETS]))
+
+
+def identify(crane, network, measurements, settings):
+    return adapted.identify(Nominal(crane, network, settings), measurements)
+
+
+def predicted_tip(crane, network, offsets, values, payload):
+    return adapted.predicted_tip(Nominal(crane, network, SETTINGS), offsets, values, payload)
+
+
+def surprise(crane, network, measurements, settings, offsets=None):
+    return adapted.surprise(Nominal(crane, network, settings), measurements, offsets)
+
+
+def predictions(crane, network, campaign, settings):
+    return predictions_of(Nominal(crane, network, settings), campaign)
+
+
+def method_of(crane, network, offsets, n_corrections=3):
+    return adapted.Adapted(Nominal(crane, network, SETTINGS), offsets, n_corrections)
 
 
 def drawn_offsets(seed, size=1.0):
@@ -91,9 +102,9 @@ def drawn_offsets(seed, size=1.0):
     generator = np.random.default_rng(seed)
     deviation = dict.fromkeys(DIMENSIONS, SETTINGS.pivot)
     deviation |= dict.fromkeys(PLAYS, SETTINGS.play_deviation)
-    deviation |= {"deflection": SETTINGS.section, "spring": SETTINGS.spring}
+    deviation |= {"deflection": SETTINGS.section, SPRING: SETTINGS.spring}
     values = {name: size * generator.normal(0.0, deviation[name]) for name in OFFSETS}
-    return offsets_of(**{k: v + (SETTINGS.play if k in PLAYS else 0.0) for k, v in values.items()})
+    return with_offsets({k: v + (SETTINGS.play if k in PLAYS else 0.0) for k, v in values.items()})
 
 
 # tips of the stand-in: another geometry, another deflection, joint play
@@ -139,12 +150,9 @@ def rigid_forces(crane, strokes, payload):
 def giving_way(crane):
     """Compliance at POSES, and its play by name."""
     found = compliance(crane.machine, crane.linkage.poses(POSES), LOADS)
-    return found, {name: found.play[:, :, k] for k, name in enumerate(JOINTS)}
-
-
-def test_joints_with_play_are_those_of_the_machine(crane):
-    found = {key.partition(".")[2]: n_pins for key, n_pins in pins_of(crane.machine).items()}
-    assert list(found.items()) == list(JOINTS.items())
+    return found, {
+        k.partition(".")[2]: found.play[:, :, n] for n, k in enumerate(pins_of(crane.machine))
+    }
 
 
 def test_joint_forces_are_those_of_the_flexible_crane(crane):
@@ -239,47 +247,47 @@ def test_a_softer_spring_gives_way_as_the_flexible_crane_does(crane):
     softer = replace(crane, machine=crane.machine.with_constants({key: stiffness / 1.1}))
     expected = tips(softer, POSES, LOADS) - tips(crane, POSES, LOADS)
     # its share is a tenth of the spring's, and the crane hangs a little lower than the rigid one
-    found = 0.1 * giving_way(crane)[0].spring
+    found = 0.1 * giving_way(crane)[0].spring[:, :, 0]
     assert found == pytest.approx(expected, rel=0.05, abs=2e-6)
 
 
 def test_factors_scale_deflection_and_spring(crane, network):
-    offsets = offsets_of(deflection=0.05, spring=-0.2)
+    offsets = with_offsets({"deflection": 0.05, SPRING: -0.2})
     inputs = np.column_stack([POSES, LOADS])
-    found = CorrectedDeflection(crane, network, offsets).predict(inputs)
-    spring = giving_way(crane)[0].spring
+    found = adapted.CorrectedDeflection(Nominal(crane, network, SETTINGS), offsets).predict(inputs)
+    spring = giving_way(crane)[0].spring[:, :, 0]
     assert found == pytest.approx(1.05 * network.predict(inputs) - 0.2 * spring, abs=1e-15)
 
 
 def test_true_offsets_put_the_tip_on_the_target(crane, network):
     offsets = drawn_offsets(1)
     tight = Offsets(np.where(np.isin(OFFSETS, PLAYS), 0.0, offsets.values))
-    method = Adapted(crane, network, tight, n_corrections=6)
+    method = method_of(crane, network, tight, n_corrections=6)
     assert mean_error(method, crane, network, tight, np.random.default_rng(1)) < 1e-6
     # with play a few targets lie in the gap where a joint's force changes its sign
-    method = Adapted(crane, network, offsets, n_corrections=6)
+    method = method_of(crane, network, offsets, n_corrections=6)
     assert mean_error(method, crane, network, offsets, np.random.default_rng(1)) < 1e-4
 
 
 def test_expected_offsets_measured_without_error_stay(crane, network):
-    expected = offsets_of(**dict.fromkeys(PLAYS, SETTINGS.play))
+    expected = with_offsets(dict.fromkeys(PLAYS, SETTINGS.play))
     exact = changed(measurement=1e-9)
     points = measured(crane, network, expected, np.random.default_rng(2), 9)
-    tip = tips_with(crane, network, expected, points.strokes, points.payload)
-    found = identify(crane, network, Measurements(points.strokes, points.payload, tip), exact)
+    tip = tips_with(crane, network, expected, points.values, points.payload)
+    found = identify(crane, network, Measurements(points.values, points.payload, tip), exact)
     assert found.values == pytest.approx(expected.values, abs=1e-9)
 
 
 def test_identified_offsets_are_the_most_probable(crane, network):
-    truth = drawn_offsets(4)
-    points = measured(crane, network, truth, np.random.default_rng(4), 9)
+    truth = drawn_offsets(9)
+    points = measured(crane, network, truth, np.random.default_rng(9), 9)
     values = identify(crane, network, points, changed(repeatability=0.0)).values
     nothing = changed(repeatability=0.0, measurement=1e6)
     scale = identify(crane, network, points, nothing).deviations  # the prior's
     expected = np.where(np.isin(OFFSETS, PLAYS), SETTINGS.play, 0.0)
 
     def cost(offsets):
-        tip = tips_with(crane, network, Offsets(offsets), points.strokes, points.payload)
+        tip = tips_with(crane, network, Offsets(offsets), points.values, points.payload)
         missed = (points.tip - tip) / SETTINGS.measurement
         return np.sum(missed**2) + np.sum(((offsets - expected) / scale) ** 2)
 
@@ -292,26 +300,26 @@ def test_identified_offsets_are_the_most_probable(crane, network):
 
 
 def test_a_row_whose_joint_forces_nearly_vanish_does_not_spoil_the_others(crane, network):
-    # row 2 has 28 N in the jib cylinder, but -140 N by the nominal crane: its play lies otherwise
-    truth = drawn_offsets(3)
-    points = measured(crane, network, truth, np.random.default_rng(3), 9)
-    true_crane = crane.like(truth.geometry(crane.geometry))
+    # row 5 has -62 N in the jib cylinder, but 20 N by the nominal crane: its play lies otherwise
+    truth = drawn_offsets(20)
+    points = measured(crane, network, truth, np.random.default_rng(20), 9)
+    true_crane = Nominal(crane, network, SETTINGS).like(truth)
     nominal, true = (
-        rigid_forces(c, points.strokes, points.payload)["drives.jib"][:, 0]
+        rigid_forces(c, points.values, points.payload)["drives.jib"][:, 0]
         for c in (crane, true_crane)
     )
-    assert np.flatnonzero(np.sign(nominal) != np.sign(true)) == [2]
+    assert np.flatnonzero(np.sign(nominal) != np.sign(true)) == [5]
     found = identify(crane, network, points, changed(repeatability=0.0))
-    modelled = tips_with(crane, network, found, points.strokes, points.payload)
+    modelled = tips_with(crane, network, found, points.values, points.payload)
     missed = np.linalg.norm(points.tip - modelled, axis=1)
-    assert np.delete(missed, 2).max() < 3 * SETTINGS.measurement
+    assert np.delete(missed, 5).max() < 3 * SETTINGS.measurement
 
 
 def test_more_measurements_leave_less_doubt(crane, network):
     points = measured(crane, network, drawn_offsets(5), np.random.default_rng(5), 30)
     less, more = (identify(crane, network, m, SETTINGS).deviations for m in (points[:5], points))
     assert (more > 0.0).all() and (more <= less * (1 + 1e-6)).all()
-    length = less[OFFSETS.index("lift_cylinder_length")]
+    length = less[OFFSETS.index("drives.lift.retracted")]
     assert length < 0.8 * np.hypot(SETTINGS.length, SETTINGS.stroke_offset)
 
 
@@ -324,7 +332,7 @@ def test_few_measurements_help_and_more_help_further(crane, network):
             method = baseline(crane, network)
             if n:
                 offsets = identify(crane, network, points[:n], SETTINGS)
-                method = Adapted(crane, network, offsets)
+                method = method_of(crane, network, offsets)
             judge = np.random.default_rng(seed + 100)
             found.append(mean_error(method, crane, network, truth, judge))
     means = {n: np.mean(found) for n, found in errors.items()}
@@ -360,7 +368,7 @@ def test_few_measurements_of_an_as_built_crane_halve_the_error(crane):
         tip += generator.normal(0.0, 0.5e-3, tip.shape)
         found = identify(crane, network, Measurements(strokes, payload, tip), expected)
         targets, payload = area(crane, generator, 30)
-        for method in (nominal, Adapted(crane, network, found)):
+        for method in (nominal, method_of(crane, network, found)):
             answer = asked(method, targets, payload)
             assert (answer.status == REACHED).all()
             reached = as_built_tips(twin, answer.values, payload)
@@ -379,15 +387,15 @@ def test_same_measurements_give_the_same_offsets_in_any_order(crane, network):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"strokes": (2, np.nan)}, "measured strokes: sample 2 is not finite"),
+        ({"values": (2, np.nan)}, "measured values: sample 2 is not finite"),
         ({"payload": (2, np.nan)}, "measured payload: sample 2 is not finite"),
         ({"tip": (2, np.nan)}, "measured tip: sample 2 is not finite"),
-        ({"strokes": ((1, 0), 5.0)}, "sample 1: the linkage does not close"),
+        ({"values": ((1, 0), 5.0)}, "sample 1: the linkage does not close"),
         ({"n": 2}, "2 rows, expected 3 or more"),
     ],
 )
 def test_measurements_that_cannot_be_are_named(crane, network, change, message):
-    given = {"strokes": POSES.copy(), "payload": LOADS.copy(), "tip": POSES[:, :2].copy()}
+    given = {"values": POSES.copy(), "payload": LOADS.copy(), "tip": POSES[:, :2].copy()}
     n = change.pop("n", 4)
     for name, (where, value) in change.items():
         given[name][where] = value
@@ -400,10 +408,10 @@ def test_measurements_that_cannot_be_are_named(crane, network, change, message):
 def test_measurements_at_the_stroke_limits_are_taken(crane, network):
     low, high = np.zeros(3), np.array(crane.geometry.stroke_maximum)
     strokes = np.array([low, high, [low[0], high[1], 0.5], [high[0], low[1], 0.5]])
-    truth = drawn_offsets(8)
+    truth = drawn_offsets(9)
     tip = tips_with(crane, network, truth, strokes, LOADS)
     found = identify(crane, network, Measurements(strokes, LOADS, tip), SETTINGS)
-    for offsets, least, most in ((drawn_offsets(8, 0.0), 5e-3, np.inf), (found, 0.0, 2e-3)):
+    for offsets, least, most in ((drawn_offsets(9, 0.0), 5e-3, np.inf), (found, 0.0, 2e-3)):
         missed = np.linalg.norm(tip - tips_with(crane, network, offsets, strokes, LOADS), axis=1)
         # the last row, stretched to its full length with the lift cylinder out, weighs little
         assert least < missed[:3].max() < most
@@ -411,7 +419,7 @@ def test_measurements_at_the_stroke_limits_are_taken(crane, network):
 
 def test_unreachable_targets_keep_their_strokes_and_say_so(crane, network):
     initial = np.array([[0.1, 0.2, 0.3]])
-    method = Adapted(crane, network, drawn_offsets(7))
+    method = method_of(crane, network, drawn_offsets(7))
     answer = method(np.array([[20.0, 0.0, 86.0]]), initial)
     assert answer.status[0] != REACHED
     assert (answer.values == initial).all()
@@ -438,10 +446,15 @@ def conditions(crane):
     return strokes, np.tile([0.0, 172.0], len(TARGETS))
 
 
+def prior_drawn(crane, network, seed):
+    prior = Nominal(crane, network, USUAL).prior
+    return Offsets(np.random.default_rng(seed).normal(prior.values, prior.deviations))
+
+
 def usual_measurements(crane, network, conditions, seed):
     """Measurements of a crane that differs as expected, its strokes never quite repeated."""
     strokes, payload = conditions
-    offsets = Offsets(np.random.default_rng(seed).normal(*prior(USUAL)))
+    offsets = prior_drawn(crane, network, seed)
     generator = np.random.default_rng((seed, 1))
     actual = strokes + generator.normal(0.0, USUAL.repeatability, strokes.shape)
     tip = predicted_tip(crane, network, offsets, actual, payload)
@@ -453,12 +466,12 @@ def test_predicted_tips_are_rigid_tips_and_deflections(crane, network, condition
     inputs = np.column_stack([strokes, payload])
     nominal = predicted_tip(crane, network, None, strokes, payload)
     np.testing.assert_allclose(nominal, forward(crane.geometry, strokes) + network.predict(inputs))
-    zero = offsets_of()
+    zero = with_offsets({})
     np.testing.assert_allclose(predicted_tip(crane, network, zero, strokes, payload), nominal)
     offsets = drawn_offsets(3)
     found = predicted_tip(crane, network, offsets, strokes, payload)
-    rigid = forward(offsets.geometry(crane.geometry), strokes)
-    moved = CorrectedDeflection(crane, network, offsets).predict(inputs)
+    rigid = forward(Nominal(crane, network, SETTINGS).like(offsets).geometry, strokes)
+    moved = adapted.CorrectedDeflection(Nominal(crane, network, SETTINGS), offsets).predict(inputs)
     np.testing.assert_allclose(found, rigid + moved)
 
 
@@ -515,7 +528,7 @@ def test_who_misjudges_expects_less():
 def campaign(crane, network, conditions):
     rows = usual_measurements(crane, network, conditions, 2)
     targets = np.repeat(TARGETS, 2, axis=0)
-    numbers = np.column_stack([targets, rows.payload, rows.strokes, rows.tip])
+    numbers = np.column_stack([targets, rows.payload, rows.values, rows.tip])
     columns = ["target_x", "target_y", "payload", *STROKES, *MEASURED]
     return pd.DataFrame(numbers, columns=columns).assign(line=np.arange(1, 13))
 

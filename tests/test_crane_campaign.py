@@ -7,15 +7,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flexik.cases.crane.parts.measured.campaign_file import COLUMNS, own_campaign, read_campaign
-from flexik.cases.crane.parts.measured.errors import campaign_errors
-from flexik.cases.crane.parts.measured.fields import CAMPAIGN, STROKES
 from flexik.errors import DataError
 from flexik.evaluation.errors import STATISTICS
 from flexik.kinematics.crane import forward
+from flexik.planar.measured.campaign_file import (
+    columns_of,
+    coordinate_columns,
+    own_campaign,
+    read_campaign,
+)
+from flexik.planar.measured.errors import campaign_errors
+from flexik.planar.measured.fields import campaign_fields, values_of
 
 REFERENCE = crane_case.ROOT / "data/reference/crane"
-GEOMETRY = crane_case.MANIPULATOR.geometry
+MACHINE = crane_case.MACHINE
+GEOMETRY, STROKES = crane_case.MANIPULATOR.geometry, values_of(MACHINE)
+COLUMNS = columns_of(coordinate_columns(MACHINE))
 GOOD = """\
 # measured on a Sunday
 method,target_x_m,target_y_m,payload_kg,measured_x_m,measured_y_m
@@ -48,7 +55,7 @@ def written(tmp_path):
 
 
 def test_positioning_campaign(written):
-    frame = read_campaign(written(GOOD))
+    frame = read_campaign(written(GOOD), MACHINE)
     assert list(frame.columns) == [
         *("line", "method", "target_x", "target_y", "payload", "measured_x", "measured_y")
     ]
@@ -59,7 +66,7 @@ def test_positioning_campaign(written):
 
 
 def test_a_strokes_only_campaign_may_repeat_a_pose(written):
-    frame = read_campaign(written(STROKES_ALONE))
+    frame = read_campaign(written(STROKES_ALONE), MACHINE)
     assert list(frame.columns) == ["line", "payload", *STROKES, "measured_x", "measured_y"]
     np.testing.assert_array_equal(frame["measured_y"], [1.2, 1.21])
 
@@ -67,13 +74,13 @@ def test_a_strokes_only_campaign_may_repeat_a_pose(written):
 def test_order_of_columns_line_ends_and_byte_order_mark_do_not_matter(written):
     lines = [line.split(",") for line in GOOD.splitlines() if line and line[0] != "#"]
     turned = "\r\n".join(",".join(reversed(cells)) for cells in lines)
-    whole = read_campaign(written(turned, "utf-8-sig")).drop(columns="line")
-    assert whole.equals(read_campaign(written(GOOD)).drop(columns="line"))
+    whole = read_campaign(written(turned, "utf-8-sig"), MACHINE).drop(columns="line")
+    assert whole.equals(read_campaign(written(GOOD), MACHINE).drop(columns="line"))
 
 
 def test_the_example_gives_both_tables():
-    campaign = own_campaign(REFERENCE / "campaign_example.csv", GEOMETRY)
-    assert {field.name for field in CAMPAIGN} == set(campaign.columns)
+    campaign = own_campaign(REFERENCE / "campaign_example.csv", MACHINE)
+    assert {field.name for field in campaign_fields(MACHINE)} == set(campaign.columns)
     assert {name.removesuffix("_kg").removesuffix("_m") for name in COLUMNS} < set(campaign.columns)
     table = campaign_errors(campaign)
     assert table.groupby("method").size().to_dict() == {"none": 27, "combined": 27}
@@ -110,7 +117,7 @@ MISTAKES = {
 def test_mistakes_are_named_with_file_and_line(written, old, new, line, message):
     assert old in GOOD
     with pytest.raises(DataError) as caught:
-        read_campaign(written(GOOD.replace(old, new)))
+        read_campaign(written(GOOD.replace(old, new)), MACHINE)
     assert f"campaign.csv, line {line}" in str(caught.value)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -135,16 +142,16 @@ def test_files_that_are_no_campaign(tmp_path, text, message):
     if text is not None:
         path.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(DataError, match=r"campaign\.csv") as caught:
-        read_campaign(path)
+        read_campaign(path, MACHINE)
     assert message in str(caught.value)
 
 
 def test_an_own_campaign_may_leave_out_strokes_or_targets(written):
-    table = own_campaign(written(GOOD), GEOMETRY)
+    table = own_campaign(written(GOOD), MACHINE)
     assert table[STROKES].isna().all(axis=None)
     assert table["target_x"].tolist() == [3.8] * 4
     x, y = forward(GEOMETRY, np.array([[0.3, 0.4, 0.5]]))[0]
-    table = own_campaign(written(f"{STROKES_HEAD}# a comment\n0.3,0.4,0.5,0,{x},{y}\n"), GEOMETRY)
+    table = own_campaign(written(f"{STROKES_HEAD}# a comment\n0.3,0.4,0.5,0,{x},{y}\n"), MACHINE)
     assert table[["target_x", "target_y"]].isna().all(axis=None)
     assert table["method"].tolist() == [""]
     assert table["line"].tolist() == [3]
@@ -161,7 +168,7 @@ def test_an_own_campaign_may_leave_out_strokes_or_targets(written):
 )
 def test_an_own_campaign_that_cannot_be_is_told(written, text, message):
     with pytest.raises(DataError, match=rf"campaign.csv, line [24]: .*{message}"):
-        own_campaign(written(text), GEOMETRY)
+        own_campaign(written(text), MACHINE)
 
 
 TARGETS = np.array([[3.8, 0.15], [3.8, 0.15], [2.2, 0.95], [2.2, 0.95]])

@@ -9,14 +9,9 @@ import pandas as pd
 import pytest
 
 from flexik.cases.crane import measured_report as said
-from flexik.cases.crane.measured_figures import adaptation as adaptation_figure
 from flexik.cases.crane.measured_figures import campaign_figures, named_points
 from flexik.cases.crane.measured_results import Measured, jib_pushes
-from flexik.cases.crane.measured_section import Measured as Section
 from flexik.cases.crane.measured_tables import MOVED, point_table, tables
-from flexik.cases.crane.parts.measured import adaptation, budget, identified
-from flexik.cases.crane.parts.measured.fields import CAMPAIGN, STROKES
-from flexik.cases.crane.parts.measured.parts import measured_parts
 from flexik.errors import FlexikError
 from flexik.evaluation.conditions import every
 from flexik.kinematics.crane import inverse_with_smallest_extension, pose
@@ -24,13 +19,20 @@ from flexik.kinematics.status import REACHED
 from flexik.multibody.as_built import as_built_tips, draw_twin
 from flexik.multibody.model import PlanarModel
 from flexik.multibody.planar import tips as tips_of
+from flexik.planar.measured import adaptation, budget, identified
+from flexik.planar.measured.adapted import Nominal
+from flexik.planar.measured.fields import campaign_fields, values_of
+from flexik.planar.measured.offsets import offsets_of
+from flexik.planar.measured.parts import measured_parts
+from flexik.planar.measured.report import adaptation_figure
+from flexik.planar.measured.section import Measured as Section
 from flexik.positioning.combined import Settings
 from flexik.positioning.method import Answer
 from flexik.positioning.none import Uncompensated
 from flexik.reporting.page import render
 
 NOMINAL = crane_case.crane(8.45e6)
-GEOMETRY = NOMINAL.geometry
+GEOMETRY, STROKES = NOMINAL.geometry, values_of(NOMINAL.machine)
 SECTION = crane_case.section()
 MEASURED = SECTION.studies.measured
 METHOD = Uncompensated(crane_case.MANIPULATOR)
@@ -54,13 +56,14 @@ def jib_tension(strokes, payload):
 
 def study(deviations=None, **changes):
     """A small adaptation of one crane."""
-    small = {"n_cranes": 1, "n_measurements": [3, 6], "n_targets": 4, **changes}
+    small = {"n_twins": 1, "n_measurements": [3, 6], "n_targets": 4, **changes}
     small["misjudged"] = MEASURED.adaptation.misjudged.model_copy(update={"n_measurements": [6]})
     sizes = MEASURED.campaign.deviations.model_copy(update=deviations or {})
     campaign = MEASURED.campaign.model_copy(update={"deviations": sizes})
     settings = MEASURED.adaptation.model_copy(update=small)
     methods = {"first": METHOD, "second": METHOD}
-    return adaptation.Study(NOMINAL, NoDeflection(), methods, campaign, settings)
+    nominal = Nominal(NOMINAL, NoDeflection(), settings.expected)
+    return adaptation.Study(nominal, methods, campaign, settings)
 
 
 def test_errors_of_a_crane_as_built_are_those_of_its_tips():
@@ -91,7 +94,7 @@ def fails(query, current):
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        (study(x=(6.3, 7.0)), r"studies\.measured\.adaptation: the crane reaches"),
+        (study(x=(6.3, 7.0)), r"studies\.measured\.adaptation: the machine reaches"),
         (
             dataclasses.replace(study(), baselines={"first": fails}),
             "6 targets are not reached, the first is",
@@ -138,16 +141,15 @@ def test_what_a_campaign_lacks_gives_no_rows(missing, monkeypatch):
     rows = campaign(exact=True)
     rows = rows.assign(line=np.arange(len(rows)), **dict.fromkeys(missing, np.nan))
     found = identified.identified(
-        crane=NOMINAL,
-        network=NoDeflection(),
-        campaign=rows[[field.name for field in CAMPAIGN]],
-        expected=MEASURED.adaptation.expected,
+        nominal=Nominal(NOMINAL, NoDeflection(), MEASURED.adaptation.expected),
+        campaign=rows[[field.name for field in campaign_fields(NOMINAL.machine)]],
         n_corrections=1,
         method=Settings(),
     )
     n_rows = {ending: len(next(iter(columns.values()))) for ending, columns in found.items()}
     whole = 0 if missing == STROKES else len(rows)
-    offsets = 0 if missing == STROKES else 29
+    known = offsets_of(NOMINAL.machine, MEASURED.adaptation.expected)
+    offsets = 0 if missing == STROKES else len(known)
     assert n_rows == {".parquet": offsets, ".predictions.parquet": whole, ".commands.parquet": 0}
 
 
@@ -158,7 +160,7 @@ def test_a_campaign_of_a_file_leaves_the_other_studies_as_they_are():
         studies = SECTION.studies.model_copy(update={"measured": measured})
         return {
             part.name: part
-            for part in measured_parts(SECTION.model_copy(update={"studies": studies}))
+            for part in measured_parts(SECTION.model_copy(update={"studies": studies}), measured)
         }
 
     built, own = described(None), described("own.csv")
@@ -235,7 +237,7 @@ def many_cranes():
 
 OFFSETS = pd.DataFrame(
     {
-        "offset": ["lift_pivot_x", "spring"],
+        "offset": ["pillar.lift_pivot.x", "spring"],
         "unit": ["m", "1"],
         "expected": 0.0,
         "expected_deviation": [3e-4, 0.05],
@@ -306,7 +308,7 @@ def test_statistics_are_by_crane(results):
     table = tables(results)["adaptation"].frame
     assert table["N"].tolist() == [0, 9, 9]
     np.testing.assert_allclose(table["mean R (mm)"], [35, 15, 30])
-    np.testing.assert_allclose(table["mean R of the worst crane (mm)"], [40, 20, 30])
+    np.testing.assert_allclose(table["mean R of the worst machine (mm)"], [40, 20, 30])
     np.testing.assert_allclose(table["max R (mm)"], [80, 40, 60])
     np.testing.assert_allclose(table["ratio to unadapted"], [1, 3 / 7, 6 / 7])
 
@@ -383,7 +385,7 @@ def test_measurements_that_stand_out_and_what_does_not_fit_are_told(results):
     assert [(row["line"], row["distance"]) for row in found["out"]] == [(8, 40.0)]
     assert found["misfit"] == pytest.approx(3.4, abs=0.01)
     (far,) = found["far"]
-    assert (far["offset"], far["away"]) == ("lift_pivot_x", pytest.approx(10.0))
+    assert (far["offset"], far["away"]) == ("pillar.lift_pivot.x", pytest.approx(10.0))
     rows = tables(results)["measured_predictions"].frame
     assert rows["measurements"].tolist() == [3, 2]
     np.testing.assert_allclose(rows["max (mm)"], [300, 300])
@@ -419,7 +421,7 @@ def test_the_page_says_what_was_found(results):
         "1 of 3 measurements stand out from what the others say and are left out",
         "point): 8 (40, 86 kg, 3.100, 1.000 m).",
         "measurements lie 3.4 times as far from their predictions as they should",
-        "an error of the origin or of units makes too: lift_pivot_x (10).",
+        "an error of the origin or of units makes too: pillar.lift_pivot.x (10).",
         "Measurements with too few others to be predicted from: 1.",
         "and of the adapted one at the 1 targets and payloads of the campaign.",
     ):

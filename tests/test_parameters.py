@@ -101,8 +101,9 @@ WRONG = [
     (f"{BEAMS}.jib.centre", [3.0, 0.2]),
     ("crane.machine.drives.jib.retracted", -0.45),
     ("crane.machine.drives.jib.limits", [0.0, 0.0]),
-    ("crane.calibration.stiffness_range", [1.0e9, 1.0e6]),
-    ("crane.calibration.stiffness", 0.0),
+    ("crane.calibration.ranges", {"joints.slew.springs.torsion": [1.0e9, 1.0e6]}),
+    ("crane.calibration.known", {"joints.slew.springs.torsion": 0.0}),
+    ("crane.calibration.mean_error", 0.0),
     ("crane.studies.mesh.refinements", [1]),
     ("crane.studies.mesh.refinements", [2, 1]),
     ("crane.studies.shape.strokes", [0.6, 0.1, 1.2]),
@@ -180,7 +181,6 @@ WRONG = [
     ("trainers.study.minimum_gradient", "1e-5"),
     (f"{INVERSION}.tolerance", "1e-7"),
     ("crane.studies.tolerance.tolerances.0", "1e-5"),
-    ("crane.calibration.stiffness_range", ["1e6", 1.0e9]),
     ("crane.machine.gravity", "nan"),
     ("crane.machine.gravity", float("nan")),
     ("crane.machine.gravity", True),
@@ -312,7 +312,8 @@ def test_a_wrong_value_comes_with_what_would_do(changed, key, value, known):
 
 
 def test_a_known_spring_is_accepted_instead_of_a_fit(changed):
-    assert changed("crane.calibration", {"stiffness": 8.5e6}).calibration.stiffness == 8.5e6
+    known = {"joints.slew.springs.torsion": 8.5e6}
+    assert changed("crane.calibration", {"known": known}).calibration.known == known
 
 
 @pytest.mark.parametrize("text", ["1e-05", "1E5", "-2.5e+3", ".5e1", "3.e2", "1.0e-5"])

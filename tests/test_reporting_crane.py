@@ -219,7 +219,7 @@ def test_the_calibration_names_what_misses_and_the_worst_point(results, text):
 def test_a_ground_spring_that_is_given_was_not_fitted(results, text):
     fitted = text(results)
     assert "the one constant that is fitted." in fitted and "mean R is what was fitted." in fitted
-    known = results.section.calibration.model_copy(update={"stiffness": 8e6})
+    known = results.section.calibration.model_copy(update={"ranges": {}})
     given = results.section.model_copy(update={"calibration": known})
     page = text(replace(results, section=given))
     assert "Ground spring 8.000 MN m/rad, as given, not fitted." in page

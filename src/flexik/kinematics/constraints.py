@@ -21,6 +21,7 @@ class Equation:
     kind : `point` (the points are one, two equations), `angle` (between the bodies), `distance` (of
         the points) or `line` (distance of the points along `direction` of the first body).
     constant, drive : what angle or distance is, in rad or m; plus a coordinate if there is a drive.
+    of : names of the points in the machine file.
 
     Points, constant and direction may be numbers of every row, (n,).
     """
@@ -32,11 +33,30 @@ class Equation:
     constant: Array | float = 0.0
     direction: Array | float = 0.0
     drive: int | None = None
+    of: tuple[str, str] = ("", "")
 
     @property
     def n_rows(self) -> int:
         """How many equations it is."""
         return 2 if self.kind == "point" else 1
+
+    def by_point(self, poses: Array, end: int) -> Array:
+        """Derivatives (n, rows, 2) of the residuals by the point of its first or second body."""
+        inner, outer = (poses[:, body] for body in self.bodies)
+        angle = (inner, outer)[end][:, 2]
+        turned = np.stack([_turned(angle, (1.0, 0.0)), _turned(angle, (0.0, 1.0))], axis=-1)
+        sign = 1.0 if end else -1.0
+        if self.kind == "point":
+            return sign * turned
+        if self.kind == "angle":
+            return np.zeros((len(poses), 1, 2))
+        if self.kind == "distance":
+            arms = [_turned(b[:, 2], p) for b, p in zip((inner, outer), self.points, strict=True)]
+            gap = outer[:, :2] - inner[:, :2] + (arms[1] - arms[0])
+            along = gap / np.hypot(gap[:, 0], gap[:, 1])[:, None]
+        else:
+            along = _turned(inner[:, 2] + self.direction, (1.0, 0.0))
+        return sign * along[:, None] @ turned
 
     def evaluate(self, poses: Array, values: Array) -> tuple[Array, Array]:
         """Residuals (n, rows), and their derivatives (n, rows, 6) by the poses of both bodies."""
@@ -111,7 +131,7 @@ def equations_of(machine: PlanarMachine, names: list[str]) -> list[Equation]:
         ends = [machine.located(end) for end in of]
         bodies = names.index(ends[0].body), names.index(ends[1].body)
         points = ends[0].point, ends[1].point
-        found.append(Equation(key, kind, bodies, points, constant, direction, drive))
+        found.append(Equation(key, kind, bodies, points, constant, direction, drive, of))
 
     for name, joint in machine.joints.items():
         key = f"joints.{name}"

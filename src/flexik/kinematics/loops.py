@@ -98,6 +98,19 @@ class Linkage:
         values, poses = values[order], poses[order]
         return values, poses, self.tangents(poses, values)
 
+    @cached_property
+    def payload(self) -> tuple[int, Array]:
+        """Number of the body that carries the payload, and the tip in its frame."""
+        body, point = self.machine.located(self.machine.payload)
+        return self.names.index(body), np.array(point)
+
+    def tip(self, poses: Array) -> tuple[Array, Array]:
+        """Tip (n, 2) at `poses` (n, b, 3), and its arm (n, 2) from the origin of its body."""
+        body, (x, y) = self.payload
+        c, s = np.cos(poses[:, body, 2]), np.sin(poses[:, body, 2])
+        arm = np.stack([c * x - s * y, s * x + c * y], axis=1)
+        return poses[:, body, :2] + arm, arm
+
     def poses(self, values: Array) -> Array:
         """Poses (n, b, 3) at `values` (n, k), NaN where the loops do not close."""
         grid, poses, tangents = self.starts

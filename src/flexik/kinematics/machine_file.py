@@ -9,6 +9,7 @@ from flexik.errors import ParameterError
 from flexik.kinematics.crane import CraneGeometry
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.elastic_arm import ArmGeometry
+from flexik.kinematics.loops import Linkage
 from flexik.kinematics.manipulator import Array, Manipulator
 from flexik.kinematics.planar import PlanarManipulator
 from flexik.machines.planar import PlanarMachine, faults, read_machine
@@ -30,10 +31,13 @@ def read_manipulator(path: Path | str) -> tuple[PlanarMachine, Manipulator]:
         raise ParameterError(f"{path}: {error}") from None
 
 
-def manipulator_of(machine: PlanarMachine) -> Manipulator:
-    """Kinematics of `machine`; raises ParameterError, which names the key, if they are not."""
+def manipulator_of(machine: PlanarMachine, near: Linkage | None = None) -> Manipulator:
+    """Kinematics of `machine`; raises ParameterError, which names the key, if they are not.
+
+    near : see kinematics.loops.Linkage.
+    """
     if machine.kinematics == "general":
-        return PlanarManipulator(machine)
+        return PlanarManipulator(machine, near)
     return _CLOSED_FORMS[machine.kinematics](machine)
 
 
@@ -94,6 +98,12 @@ def crane_geometry(machine: PlanarMachine) -> CraneGeometry:
             raise ParameterError(f"kinematics: crane expects a cylinder drives.{name}")
         return drive.retracted
 
+    telescope = machine.drives.get("extension")
+    if telescope is None or telescope.kind != "telescope":
+        raise ParameterError("kinematics: crane expects a telescope drives.extension")
+    # the tip slides along the pads
+    beside = _point(machine, "extension.tip") - _point(machine, "extension.rear_pad")
+    start = point("jib.extension_start")[0] + telescope.retracted
     lift, jib, extension = _limits(machine, 3)[1]
     return CraneGeometry(
         lift_pivot=point("pillar.lift_pivot"),
@@ -103,37 +113,12 @@ def crane_geometry(machine: PlanarMachine) -> CraneGeometry:
         rocker_pivot=point("lift.rocker_pivot"),
         jib_cylinder_base=point("lift.jib_cylinder_base"),
         coupler_pin=point("jib.coupler_pin"),
-        extension_start=point("jib.extension_start"),
+        extension_start=(start, point("jib.front_pad")[1] + float(beside[1])),
         lift_cylinder_length=cylinder("lift"),
         jib_cylinder_length=cylinder("jib"),
         rocker_length=distance("rocker.rocker_pivot", "rocker.rocker_head"),
         coupler_length=distance("coupler.rocker_head", "coupler.coupler_pin"),
         stroke_maximum=(lift, jib, extension),
-    )
-
-
-def with_geometry(machine: PlanarMachine, geometry: CraneGeometry) -> PlanarMachine:
-    """The crane `machine`, whose frames are those of `geometry`, with these dimensions."""
-    points = {
-        "pillar": ("lift_pivot", "lift_cylinder_base"),
-        "lift": ("lift_cylinder_head", "jib_pivot", "rocker_pivot", "jib_cylinder_base"),
-        "jib": ("coupler_pin", "extension_start"),
-    }
-    found: dict[str, object] = {
-        f"bodies.{body}.points.{name}": getattr(geometry, name)
-        for body, names in points.items()
-        for name in names
-    }
-    along = machine.located("jib.front_pad").point[0], geometry.extension_start[1]
-    return machine.with_constants(
-        found
-        | {
-            "bodies.jib.points.front_pad": along,
-            "bodies.rocker.points.rocker_head": (geometry.rocker_length, 0.0),
-            "bodies.coupler.points.coupler_pin": (geometry.coupler_length, 0.0),
-            "drives.lift.retracted": geometry.lift_cylinder_length,
-            "drives.jib.retracted": geometry.jib_cylinder_length,
-        }
     )
 
 

@@ -55,10 +55,13 @@ class Search(NamedTuple):
 class PlanarManipulator:
     """See kinematics.manipulator.Manipulator; any number of drives, strokes in m or angles in rad.
 
+    near : see kinematics.loops.Linkage.
+
     Raises ParameterError, which names the key, where the machine is no mechanism.
     """
 
     machine: PlanarMachine
+    near: Linkage | None = None
 
     def __post_init__(self) -> None:
         self.linkage  # noqa: B018  what is wrong with a machine shows at once
@@ -66,7 +69,7 @@ class PlanarManipulator:
     @cached_property
     def linkage(self) -> Linkage:
         """The bodies and what holds them."""
-        return Linkage(self.machine)
+        return Linkage(self.machine, self.near)
 
     @property
     def lower(self) -> Array:
@@ -81,7 +84,7 @@ class PlanarManipulator:
     def forward(self, values: Array) -> Array:
         """Tip (n, 2) in m at coordinates (n, k); NaN where the loops do not close."""
         values = np.atleast_2d(np.asarray(values, dtype=float))
-        return self._tip(self.linkage.poses(values))[0]
+        return self.linkage.tip(self.linkage.poses(values))[0]
 
     def derivatives(self, values: Array) -> Array:
         """Derivatives (n, 2, k) of the tip by the coordinates `values` (n, k)."""
@@ -306,24 +309,11 @@ class PlanarManipulator:
             distance += ((least[:, None] - values[pool, self._first]) * scale) ** 2
         return values[pool[distance.argmin(axis=1)]] if len(targets) else values[:0]
 
-    @cached_property
-    def _payload(self) -> tuple[int, Array]:
-        """Number of the body that carries the payload, and the tip in its frame."""
-        body, point = self.machine.located(self.machine.payload)
-        return self.linkage.names.index(body), np.array(point)
-
-    def _tip(self, poses: Array) -> tuple[Array, Array]:
-        """Tip (n, 2), and its arm (n, 2) from the origin of the body that carries it."""
-        body, (x, y) = self._payload
-        c, s = np.cos(poses[:, body, 2]), np.sin(poses[:, body, 2])
-        arm = np.stack([c * x - s * y, s * x + c * y], axis=1)
-        return poses[:, body, :2] + arm, arm
-
     def _moved(self, poses: Array, values: Array) -> tuple[Array, Array, Array]:
         """Tip (n, 2), its derivatives (n, 2, k), and those of the poses (n, b, 3, k)."""
         tangents = self.linkage.tangents(poses, values)
-        tip, arm = self._tip(poses)
-        of_body = tangents[:, self._payload[0]]
+        tip, arm = self.linkage.tip(poses)
+        of_body = tangents[:, self.linkage.payload[0]]
         across = np.stack([-arm[:, 1], arm[:, 0]], axis=1)
         return tip, of_body[:, :2] + across[:, :, None] * of_body[:, 2:], tangents
 

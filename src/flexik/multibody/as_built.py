@@ -5,17 +5,17 @@ the side of its hole to which its force pushes it. A pin is tight in the inner o
 cylinder has play at either end.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from flexik.errors import ParameterError
 from flexik.machines.deviations import Magnitudes
-from flexik.machines.planar import Cylinder, Fixed, Pin, PlanarMachine, Telescope
+from flexik.machines.planar import Cylinder
 from flexik.machines.sections import Array
 from flexik.multibody.flexible import FlexibleMachine
-from flexik.multibody.joint_forces import joint_forces, pins_of
+from flexik.multibody.joint_forces import joint_forces, pins_of, point_key, points_of, springs_of
 from flexik.multibody.model import PlanarModel, failed
 from flexik.multibody.planar import solve
 
@@ -43,14 +43,14 @@ class AsBuilt:
 
     machine : as it was built, without play.
     play : radial clearance by joint or cylinder with pins, m; of both ends together.
-    stroke_offset : (k,) in m, actual actuator coordinates minus what the sensors say.
-    repeatability : standard deviation of an actual coordinate about that, m.
+    stroke_offset : (k,) in m or rad, actual actuator coordinates minus what the sensors say.
+    repeatability : standard deviation (k,) of an actual coordinate about that, or one for all.
     """
 
     machine: FlexibleMachine
     play: Play
     stroke_offset: Array
-    repeatability: float
+    repeatability: Array | float
 
 
 def draw_twin(nominal: FlexibleMachine, magnitudes: Magnitudes, seed: int) -> AsBuilt:
@@ -60,11 +60,9 @@ def draw_twin(nominal: FlexibleMachine, magnitudes: Magnitudes, seed: int) -> As
     """
     rng, machine = np.random.default_rng(seed), nominal.machine
     changed: dict[str, object] = {}
-    for body, point in _measured_points(machine):
+    for end in points_of(machine):
         off = magnitudes.pivot * rng.standard_normal(2)
-        changed[f"bodies.{body}.points.{point}"] = np.add(
-            machine.bodies[body].points[point], off
-        ).tolist()
+        changed[point_key(end)] = np.add(machine.located(end).point, off).tolist()
     for name, drive in machine.drives.items():
         if isinstance(drive, Cylinder):
             longer = magnitudes.length * float(rng.standard_normal())
@@ -73,22 +71,21 @@ def draw_twin(nominal: FlexibleMachine, magnitudes: Magnitudes, seed: int) -> As
         key: sum(magnitudes.play * np.exp(magnitudes.play_spread * rng.standard_normal(n_pins)))
         for key, n_pins in pins_of(machine).items()
     }
-    stroke_offset = magnitudes.stroke_offset * rng.standard_normal(len(machine.drives))
+    turns = np.array([drive.kind == "revolute" for drive in machine.drives.values()])
+    sizes = np.where(turns, magnitudes.angle_offset, magnitudes.stroke_offset)
+    stroke_offset = sizes * rng.standard_normal(len(machine.drives))
     for name in machine.beams:
         stiffer = float(np.exp(magnitudes.section * rng.standard_normal()))
         changed[f"bodies.{name}.stiffness_factor"] = stiffer
-    for name, joint in machine.joints.items():
-        if isinstance(joint, Fixed):
-            for spring, value in joint.springs:
-                if value is not None:
-                    stiffer = float(np.exp(magnitudes.spring * rng.standard_normal()))
-                    changed[f"joints.{name}.springs.{spring}"] = value * stiffer
-    built = replace(nominal, machine=machine.with_constants(changed), near=nominal.linkage)
+    for key, value in springs_of(machine).items():
+        changed[key] = value * float(np.exp(magnitudes.spring * rng.standard_normal()))
+    built = nominal.like(machine.with_constants(changed))
     try:
         _check_corners(built)
     except ParameterError as error:
         raise ParameterError(f"as-built machine of seed {seed}: {error}") from None
-    return AsBuilt(built, play, stroke_offset, magnitudes.repeatability)
+    repeats = np.where(turns, magnitudes.angle_repeatability, magnitudes.repeatability)
+    return AsBuilt(built, play, stroke_offset, repeats)
 
 
 def as_built_tips(
@@ -176,18 +173,6 @@ def _check_corners(machine: FlexibleMachine) -> None:
     if broken.any():
         row = corners[np.argmax(broken)]
         raise ParameterError(str(failed(machine, row, "the linkage does not close")))
-
-
-def _measured_points(machine: PlanarMachine) -> Iterator[tuple[str, str]]:
-    """Bodies and points where pins, cylinders and telescopes are, but for origins of frames."""
-    parts: list[Pin | Cylinder | Telescope]
-    parts = [p for p in machine.joints.values() if isinstance(p, Pin)]
-    parts += [d for d in machine.drives.values() if isinstance(d, Cylinder | Telescope)]
-    ends = dict.fromkeys(end for part in parts for end in part.of)
-    for end in ends:
-        body, _, point = end.partition(".")
-        if body in machine.bodies and any(machine.located(end).point):
-            yield body, point
 
 
 def _expected_seats(twin: AsBuilt, strokes: Array, payload: Array) -> dict[str, Array]:

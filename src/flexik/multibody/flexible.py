@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -63,6 +64,10 @@ class FlexibleMachine:
     def linkage(self) -> Linkage:
         """The rigid bodies."""
         return Linkage(self.machine, self.near)
+
+    def like(self, machine: PlanarMachine) -> Self:
+        """The same of a `machine` whose dimensions are a little off its own."""
+        return replace(self, machine=machine, near=self.linkage)
 
     @cached_property
     def size(self) -> float:

@@ -1,6 +1,6 @@
 """The section of a planar flexible machine in params.yaml."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -19,6 +19,9 @@ from flexik.parameters.conditions import ConditionSet, Points
 from flexik.parameters.model import Count, Model, Name, NotNegative, Seed, Share
 from flexik.parameters.networks import Axis, Regressor, TorchModule, check_networks
 from flexik.parameters.section import CaseSection
+from flexik.planar.calibration_section import Calibration
+from flexik.planar.measured.campaign_file import own_campaign
+from flexik.planar.measured.section import Measured
 from flexik.planar.network_section import AnyNetwork, PlanarNetwork
 from flexik.positioning.beam_model import theory
 from flexik.positioning.beam_network import Settings as BeamNetwork
@@ -139,6 +142,8 @@ class LearningCurves(Model):
 class PlanarSection(CaseSection):
     """A planar flexible machine."""
 
+    calibration: Calibration = Calibration()  # type: ignore[assignment]
+
     machine: PlanarMachine
     samples: Samples
     networks: Annotated[dict[Name, AnyNetwork], Field(min_length=1)]
@@ -157,8 +162,12 @@ class PlanarSection(CaseSection):
 
     @property
     def files(self) -> list[Path]:
-        """Section tables, and samples of the user's own."""
+        """Section tables, and samples and campaigns of the user's own."""
         own = [self.samples.file] if isinstance(self.samples, OwnSamples) else []
+        own += [self.calibration.campaign] if self.calibration.campaign else []
+        own += (
+            [self.measured.campaign.file] if self.measured and self.measured.campaign.file else []
+        )
         return [Path(file) for file in (*self.machine.section_files.values(), *own)]
 
     def file_of(self, name: str) -> Path:
@@ -177,6 +186,22 @@ class PlanarSection(CaseSection):
             return load_modules
         return load_regressor if isinstance(network, Regressor) else load_networks
 
+    @property
+    def measured(self) -> Measured | None:
+        """Studies of a measured machine, if there are some."""
+        return None
+
+    @property
+    def calibration_points(self) -> Points | None:
+        """Conditions of the mean error that is fitted, if one is."""
+        found = self.calibration.conditions
+        if not isinstance(found, str):
+            return found
+        named = self.conditions.get(found)
+        if not isinstance(named, Points):
+            raise ValueError(f"calibration.conditions: there are no points {found!r}")
+        return named
+
     def base_of(self, name: str) -> dict[str, Any]:
         """Settings of the beam theory whose remainder network `name` learns, if it does."""
         network = self.networks[name]
@@ -188,6 +213,10 @@ class PlanarSection(CaseSection):
     @model_validator(mode="after")
     def _fits_its_machine(self) -> Self:
         self._check_grid()
+        self.calibration.check_keys(self.machine)
+        self.calibration_points  # noqa: B018  a wrong name shows at once
+        if self.measured is not None:
+            self.measured.check_methods(self.methods)
         check_networks(self.networks, self.trainers)
         for name, network in self.networks.items():
             if network.corrects and self.networks[network.corrects].learns != "rigid_tip":
@@ -249,10 +278,10 @@ def check_curves(section: PlanarSection, study: LearningCurves | None) -> None:
             )
 
 
-def check(section: PlanarSection, others: Mapping[str, Any] | None = None) -> None:
-    """The machine is one, and targets are reached: those of conditions, and `others` by key.
+def check(section: PlanarSection) -> None:
+    """The machine is one, targets are reached, campaigns of the user's own can be read.
 
-    Raises ParameterError naming the key.
+    Raises ParameterError naming the key, or DataError naming file and line.
     """
     try:
         check_machine(section.machine)
@@ -261,8 +290,18 @@ def check(section: PlanarSection, others: Mapping[str, Any] | None = None) -> No
     _check_learners(section)
     if isinstance(section.samples, Samples):
         _check_payloads(section)
-    sets = {f"conditions.{name}": given for name, given in section.conditions.items()}
-    for key, given in (sets | dict(others or {})).items():
+    sets: dict[str, Any] = {
+        f"conditions.{name}": given for name, given in section.conditions.items()
+    }
+    if isinstance(section.calibration.conditions, Points):
+        sets["calibration.conditions"] = section.calibration.conditions
+    if (measured := section.measured) is not None:
+        sets["studies.measured.campaign"] = measured.campaign
+        sets["studies.measured.adaptation"] = measured.adaptation
+    for file in (section.calibration.campaign, measured and measured.campaign.file):
+        if file:
+            own_campaign(file, section.machine)
+    for key, given in sets.items():
         if isinstance(given, Points):
             points = np.array(given.points)
             missed = np.flatnonzero(~_reached(section, points))

@@ -1,26 +1,22 @@
 """Figures of a measuring campaign and of what a few measurements teach (Rouvinen 1999, 4.6)."""
 
-from collections.abc import Mapping
-
 import numpy as np
 import pandas as pd
 
-from flexik.cases.crane.parts.measured.fields import ADAPTED, METHODS, MISJUDGED, TARGET
 from flexik.cases.crane.report_mechanism import LINK_LOOKS, links
 from flexik.kinematics.crane import CraneGeometry, smallest_extension
+from flexik.planar.measured.fields import METHODS, TARGET
 from flexik.reporting import kinds, style
 from flexik.reporting.chart import Axis, Layer, chart
 from flexik.reporting.report import Drawing, draw
 from flexik.reporting.style import MM
 
 TITLES = {"none": "without compensation", "combined": "with compensation"}
-STATISTICS = {"mean_error": "mean R (mm)", "p95_error": "95th percentile of R (mm)"}
 # Figures of tables 4.2 and 4.3
 NAMED_POINTS = np.array([[3.8, 0.15], [3.8, 0.95]])
 
 MARGIN = 0.6  # m about what is drawn of the working area
 RASTER = 0.025  # m between the points that tell the working area
-GOAL_WIDTH = 0.07  # of the largest number of measurements, either side
 
 
 def campaign_figures(
@@ -150,48 +146,4 @@ def _achieved(errors: pd.DataFrame, target: np.ndarray) -> Drawing:
         equal=True,
         width=6.4,
         height=6.6,
-    )
-
-
-def adaptation(adapted: pd.DataFrame, goals: Mapping[int, float]) -> Drawing:
-    """Mean and 95th percentile of the error against the number of measurements.
-
-    adapted : method, n_measurements, twin and STATISTICS in m. The lines are means over the cranes,
-        the band of `adapted` reaches from the best crane to the worst. N = 0 is the first method,
-        which is adapted.
-    goals : mean error (m) to fall below, by number of measurements.
-    """
-    long = adapted.melt(["method", "n_measurements"], list(STATISTICS), "panel", "error")
-    own = long[long["method"].isin([adapted["method"].iloc[0], ADAPTED])]
-    keys = ["panel", "n_measurements"]
-    spread = own.groupby(keys)["error"].agg(["mean", "min", "max"]).reset_index()
-    wrong = long[long["method"] == MISJUDGED].groupby(keys)["error"].mean().reset_index()
-    named = spread.assign(text=[f"{MM * v:.1f}" for v in spread["mean"]], dx=-2.0, dy=-10.0)
-    named, numbers = named.assign(side="right"), sorted(set(long["n_measurements"]))
-    at, cranes = "n_measurements", "from the best crane to the worst"
-    sky, small = {"color": style.SKY, "alpha": 0.3}, {"fontsize": 8.5, "path_effects": []}
-    square = {"color": style.ORANGE, "markersize": 5.5, "fillstyle": "none"}
-    marked = {"color": style.VERMILION, "linewidth": 0.9, "marker": "v", "markevery": [1]}
-    layers = [
-        Layer(spread, at, "min", "band", to="max", label=cranes, look=sky),
-        Layer(spread, at, "mean", "o-", label="mean over the cranes"),
-        Layer(named, at, "mean", "text", text="text", look=small),
-    ]
-    if len(wrong):
-        layers.append(Layer(wrong, at, "error", "s", label="mean, misjudged", look=square))
-    width = GOAL_WIDTH * numbers[-1]  # short: a goal is for its number only
-    for k, (number, goal) in enumerate(goals.items()):
-        line = pd.DataFrame({at: [number - width, number, number + width], "error": goal})
-        line["panel"] = "mean_error"
-        layers.append(Layer(line, at, "error", "-", label="" if k else "goal", look=marked))
-    return draw(
-        chart,
-        *layers,
-        x=Axis("measured points N", ticks=numbers, margin=0.12),
-        y=Axis("error (mm), logarithmic", MM, log=True),
-        panel="panel",
-        panels=tuple(STATISTICS),
-        titles=STATISTICS,
-        columns=2,
-        height=4.4,
     )

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from flexik.cases.crane.measured_figures import adaptation, campaign_figures, named_points
+from flexik.cases.crane.measured_figures import campaign_figures, named_points
 from flexik.cases.crane.measured_results import PUBLISHED_PAYLOADS, Measured, jib_pushes, read
 from flexik.cases.crane.measured_tables import (
     BUDGET_TITLES,
@@ -17,10 +17,11 @@ from flexik.cases.crane.measured_tables import (
     tables,
     worse_shares,
 )
-from flexik.cases.crane.parts.measured.fields import MEASURED, METHODS
-from flexik.cases.crane.parts.measured.predictions import misfit
 from flexik.cases.crane.section import Section
 from flexik.kinematics.status import REACHED
+from flexik.planar.measured.fields import MEASURED, METHODS
+from flexik.planar.measured.predictions import misfit
+from flexik.planar.measured.report import adaptation_figure
 from flexik.reporting.report import Content
 from flexik.reporting.style import MM
 
@@ -42,7 +43,7 @@ def measured(section: Section) -> Content:
 
 def content(results: Measured) -> Content:
     """See `measured`."""
-    drawn = {"adaptation": adaptation(results.adapted, goals(results))}
+    drawn = {"adaptation": adaptation_figure(results.adapted, goals(results))}
     if results.errors is not None:
         geometry, (strokes, pushes) = results.crane.geometry, jib_pushes(results)
         drawn |= campaign_figures(results.errors, geometry, strokes, pushes)

@@ -8,13 +8,14 @@ import numpy as np
 import pandas as pd
 
 from flexik.cases.crane.parts.crane import FlexibleCrane, flexible
-from flexik.cases.crane.parts.measured.errors import campaign_errors
-from flexik.cases.crane.parts.measured.fields import TARGET
 from flexik.cases.crane.report_results import REFERENCE
 from flexik.cases.crane.section import Section
 from flexik.datasets.tables import read_csv, read_table
 from flexik.kinematics.crane import inverse_with_smallest_extension
 from flexik.multibody.joint_forces import joint_forces
+from flexik.planar.measured.errors import campaign_errors
+from flexik.planar.measured.fields import TARGET
+from flexik.planar.measured.report import by_twin
 
 # data/reference/crane/measured_errors.csv and measured_reference_errors.csv hold tables 4.2 and 4.3
 # as printed. Over all payloads and without compensation table 4.2, and the text with it, has a
@@ -65,14 +66,8 @@ class Measured:
 
     @cached_property
     def adapted(self) -> pd.DataFrame:
-        """Errors (m) over the targets of each crane: mean, 95th percentile, largest."""
-        keys = ["method", "n_measurements", "twin"]
-        groups = self.adaptation.groupby(keys, sort=False)["error"]
-        found = groups.agg(mean_error="mean", p95_error=lambda e: e.quantile(0.95), max_error="max")
-        order = {name: k for k, name in enumerate(self.adaptation["method"].unique())}
-        return found.reset_index().sort_values(
-            keys, key=lambda c: c.map(order) if c.name == "method" else c, ignore_index=True
-        )
+        """Result of by_twin."""
+        return by_twin(self.adaptation)
 
 
 def read(section: Section) -> Measured:

@@ -6,12 +6,13 @@ import numpy as np
 import pandas as pd
 
 from flexik.cases.crane.measured_results import ERRORS, PUBLISHED_PAYLOADS, Measured, jib_force
-from flexik.cases.crane.parts.measured.fields import TARGET
 from flexik.cases.crane.report_tables import STATISTIC_NAMES
 from flexik.evaluation.errors import STATISTICS
 from flexik.kinematics.crane import inverse_with_smallest_extension, pose
+from flexik.planar.measured.fields import TARGET
+from flexik.planar.measured.report import adaptation_table, offset_table, prediction_table
 from flexik.reporting.style import MM
-from flexik.reporting.tables import Column, Table, mm, table
+from flexik.reporting.tables import Table, mm, table
 
 COMPENSATION = {"none": "without", "combined": "with"}
 # By column of Measured.budget_means
@@ -39,9 +40,9 @@ def tables(results: Measured) -> dict[str, Table]:
     if results.errors is not None:
         found |= {name: _errors_table(results, name) for name in ERRORS}
     if len(results.offsets):
-        found["measured_predictions"] = _prediction_table(results.predictions)
-        found["identified_offsets"] = _offset_table(results.offsets)
-    return found | {"adaptation": _adaptation_table(results.adapted)}
+        found["measured_predictions"] = prediction_table(results.predictions)
+        found["identified_offsets"] = offset_table(results.offsets)
+    return found | {"adaptation": adaptation_table(results.adapted)}
 
 
 def _errors_table(results: Measured, name: str) -> Table:
@@ -144,48 +145,3 @@ def _budget_table(results: Measured) -> Table:
     ]
     titles = {f"{title} (mm)": mm(name, 1) for name, title in BUDGET_TITLES.items()}
     return table(means, {"deviation": "deviation", **titles})
-
-
-def _prediction_table(predictions: pd.DataFrame) -> Table:
-    """Distances of the measured points from their predictions, nominal and adapted."""
-    errors = {name: predictions[f"{name}_error"].dropna() for name in ("nominal", "adapted")}
-    rows = [
-        {"crane": name, "n": len(e), "mean": e.mean(), "p95": e.quantile(0.95), "max": e.max()}
-        for name, e in errors.items()
-        if len(e)
-    ]
-    columns = {"crane": "crane", "measurements": "n", "mean (mm)": mm("mean", 1)}
-    return table(rows, {**columns, "95th percentile (mm)": mm("p95", 1), "max (mm)": mm("max", 1)})
-
-
-def _offset_table(offsets: pd.DataFrame) -> Table:
-    """Offsets before and after measuring, in mm and percent, standard deviations after +-."""
-    scale = offsets["unit"].map({"m": MM, "1": 100.0})
-    names = {"expected": "expected", "expected_deviation": "+- before"}
-    names |= {"identified": "identified", "deviation": "+- after"}
-    scaled = {title: scale * offsets[name] for name, title in names.items()}
-    unit = offsets["unit"].map({"m": "mm", "1": "%"})
-    return Table(pd.DataFrame({"offset": offsets["offset"], "unit": unit, **scaled}), 3)
-
-
-def _adaptation_table(adapted: pd.DataFrame) -> Table:
-    """Means over the cranes, and their worst; the first method is the one that is adapted."""
-    groups = adapted.groupby(["method", "n_measurements"], sort=False)
-    rows = groups.agg(
-        mean=("mean_error", "mean"),
-        p95=("p95_error", "mean"),
-        worst=("mean_error", "max"),
-        most=("max_error", "max"),
-    ).reset_index()
-    return table(
-        rows.assign(ratio=rows["mean"] / rows["mean"].iloc[0]),
-        {
-            "method": "method",
-            "N": "n_measurements",
-            "mean R (mm)": mm("mean"),
-            "95th percentile of R (mm)": mm("p95"),
-            "mean R of the worst crane (mm)": mm("worst"),
-            "max R (mm)": mm("most"),
-            "ratio to unadapted": Column("ratio"),
-        },
-    )

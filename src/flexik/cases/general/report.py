@@ -17,6 +17,15 @@ from flexik.machines.bodies import Beam
 from flexik.parameters.conditions import RandomTargets
 from flexik.planar import held_out, learning_curves
 from flexik.planar.fields import deflection
+from flexik.planar.measured.errors import campaign_errors
+from flexik.planar.measured.fields import TARGET
+from flexik.planar.measured.report import (
+    adaptation_figure,
+    adaptation_table,
+    by_twin,
+    offset_table,
+    prediction_table,
+)
 from flexik.planar.picture import moved, picture
 from flexik.planar.samples import counts
 from flexik.planar.section import OwnSamples
@@ -104,6 +113,29 @@ class Results:
         return learning_curves.read(self.section, self.section.studies.learning_curves)
 
     @cached_property
+    def campaign(self) -> pd.DataFrame:
+        """Errors of the measured points; none where nothing is measured or no targets are known."""
+        found = self.measured("campaign")
+        known = len(found) and found[TARGET].notna().all(axis=None)
+        return campaign_errors(found) if known else pd.DataFrame()
+
+    @cached_property
+    def adapted(self) -> pd.DataFrame:
+        """Errors of each machine as built before and after adaptation."""
+        found = self.measured("adaptation")
+        return by_twin(found) if len(found) else found
+
+    @cached_property
+    def offsets(self) -> pd.DataFrame:
+        """What the campaign identifies."""
+        return self.measured("identified")
+
+    def measured(self, name: str) -> pd.DataFrame:
+        """A table of planar.measured; empty where nothing is measured."""
+        path = self.section.data / f"studies/measured/{name}.parquet"
+        return read_table(path) if self.section.measured else pd.DataFrame()
+
+    @cached_property
     def shape(self) -> dict[str, Any]:
         """The sample that the picture shows."""
         found: dict[str, Any] = read_json(self.section.data / "studies/shape.json")
@@ -134,6 +166,16 @@ def tables(results: Results) -> dict[str, Table]:
             found[f"payload_{name}"] = _by_payload(results.errors[name])
     if results.held_out:
         found["held_out"] = table(_distances(results), statistics | {"method": "method"})
+    if len(results.campaign):
+        rows = results.campaign.groupby("method", sort=False)["error"]
+        means = rows.agg(measurements="size", mean="mean", max="max").reset_index()
+        columns = {"method": "method", "measurements": "measurements", "mean (mm)": mm("mean", 1)}
+        found["measured_errors"] = table(means, columns | {"max (mm)": mm("max", 1)})
+    if len(results.adapted):
+        found["adaptation"] = adaptation_table(results.adapted)
+    if len(results.offsets):
+        found["identified_offsets"] = offset_table(results.offsets)
+        found["measured_predictions"] = prediction_table(results.measured("identified.predictions"))
     errors = {name: Column(name, 6) for name in ("least", "median", "largest")}
     told = ("network", "learns", "hidden", "restarts", "trainer")
     found["networks"] = table(results.networks, {name: name for name in told} | errors)
@@ -206,6 +248,8 @@ def figures(results: Results) -> dict[str, Drawing]:
             )
     if len(results.curves):
         found["learning_curves"] = curves.figure(results.curves)
+    if len(results.adapted):
+        found["adaptation"] = adaptation_figure(results.adapted)
     if results.held_out:
         frame = pd.concat([f.assign(method=m) for m, f in results.held_out.items()])
         axis = Axis("distance (mm)", MM, log=True)
@@ -229,6 +273,11 @@ def metrics(results: Results) -> dict[str, float | None]:
         errors = frame["error"]
         for which, value in (("mean", errors.mean()), ("max", errors.max())):
             found[f"held_out.{name}.{which}_error_mm"] = round(MM * value, 4)
+    if len(results.adapted):
+        means = results.adapted.groupby(["method", "n_measurements"], sort=False)["mean_error"]
+        for row in means.mean().reset_index().to_dict("records"):
+            key = f"measured.{row['method']}_{row['n_measurements']}.mean_error_mm"
+            found[key] = round(MM * row["mean_error"], 4)
     for name, samples in results.samples.items():
         found |= {f"{name}.{key}": n for key, n in counts(samples).items()}
     for row in results.networks.to_dict("records"):
@@ -261,4 +310,16 @@ def values(results: Results) -> dict[str, Any]:
         "mass": sum(mass for _, _, mass in results.section.machine.masses().values()),
         "moved": moved(results.shape),
         "shape": results.shape,
+        "measured": results.section.measured,
+        "adapted": _adapted_said(results.adapted),
+        "has_targets": len(results.campaign) > 0,
+        "has_offsets": len(results.offsets) > 0,
     }
+
+
+def _adapted_said(adapted: pd.DataFrame) -> dict[str, Any] | None:
+    """Mean errors (m) of the method that is adapted, of the nominal machine and at last."""
+    if adapted.empty:
+        return None
+    means = adapted.groupby("n_measurements")["mean_error"].mean()
+    return {"before": means.iloc[0], "after": means.iloc[-1], "n": means.index[-1]}

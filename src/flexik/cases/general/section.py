@@ -9,6 +9,7 @@ from flexik.errors import DataError, ParameterError
 from flexik.parameters.conditions import ConditionSet
 from flexik.parameters.model import Model, Name, NotNegative
 from flexik.planar import section as planar
+from flexik.planar.measured.section import Measured
 from flexik.planar.own_samples import read_own
 from flexik.planar.section import (
     AnySamples,
@@ -37,16 +38,18 @@ class Studies(Model):
     picture : sample that is drawn; not given: all drives in the middle of their limits, the largest
         payload of the grid.
     learning_curves : errors by number of samples; not given: none.
+    measured : campaign on machines as built, and adaptation to it; not given: there is none.
     """
 
     picture: Picture | None = None
     learning_curves: LearningCurves | None = None
+    measured: Measured | None = None
 
 
 class Section(PlanarSection):
-    """A machine of a file whose constants are all known.
+    """A machine of a file and nothing else.
 
-    calibration : null, as nothing is fitted.
+    calibration : constants that are `fit` in the machine file, known or fitted; null where none is.
     samples : equilibria of the model, or a file of samples of one's own.
     networks : what learns, by name; at least one.
     conditions : sets of targets and payloads by name; none where samples are of a file, which comes
@@ -61,14 +64,17 @@ class Section(PlanarSection):
     methods: Methods = Field(default_factory=dict)
     studies: Studies = Studies()
 
+    @property
+    def measured(self) -> Measured | None:
+        """Studies of a machine as built."""
+        return self.studies.measured
+
     @model_validator(mode="after")
-    def _is_known(self) -> Self:
+    def _is_complete(self) -> Self:
         if isinstance(self.samples, OwnSamples):
             self._check_own()
         elif not self.conditions:
             raise ValueError("conditions: expected a set, on which methods are judged")
-        if free := self.machine.free:
-            raise ValueError(f"machine.{free[0]}: expected a value; this case fits none")
         for name, network in self.networks.items():
             if network.learns == "coordinates" and len(self.machine.drives) != 2:
                 raise ValueError(
@@ -81,6 +87,10 @@ class Section(PlanarSection):
         return self
 
     def _check_own(self) -> None:
+        if self.machine.free and self.calibration.campaign is None and self.calibration.ranges:
+            raise ValueError("calibration: expected known, or campaign; there are no conditions")
+        if self.studies.measured is not None:
+            raise ValueError("studies.measured: samples of a file come with no model to measure")
         if self.conditions or set(self.methods) - {"none"}:
             raise ValueError(
                 f"{'conditions' if self.conditions else 'methods'}: expected none; samples of a "

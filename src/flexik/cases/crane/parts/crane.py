@@ -1,12 +1,11 @@
 """The flexible crane that the pipeline has calibrated, for parts that put it into equilibrium."""
 
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
 from flexik.cases.crane.section import SPRING
 from flexik.kinematics.crane import CraneGeometry
-from flexik.kinematics.machine_file import crane_geometry, with_geometry
+from flexik.kinematics.machine_file import crane_geometry
 from flexik.machines.planar import Fixed, PlanarMachine
 from flexik.multibody.flexible import FlexibleMachine
 from flexik.planar.constants import known
@@ -19,11 +18,6 @@ class FlexibleCrane(FlexibleMachine):
     def geometry(self) -> CraneGeometry:
         """Its dimensions."""
         return crane_geometry(self.machine)
-
-    def like(self, geometry: CraneGeometry) -> "FlexibleCrane":
-        """The same with the dimensions `geometry`, a little off its own."""
-        machine = with_geometry(self.machine, geometry)
-        return replace(self, machine=machine, near=self.linkage)
 
 
 def flexible(machine: PlanarMachine, constants: Path) -> FlexibleCrane:

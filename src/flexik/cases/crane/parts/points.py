@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from flexik.cases.crane.parts.calibrate import PUBLISHED, published_mean
 from flexik.cases.crane.parts.crane import flexible, on_spring, stiffness_of
-from flexik.cases.crane.section import PointStudy, Section
+from flexik.cases.crane.section import PUBLISHED_MEAN, PointStudy, Section
 from flexik.datasets.parts import Part, Work, Writer, stacked, table
 from flexik.datasets.tables import Field
 from flexik.errors import ParameterError
@@ -53,13 +52,13 @@ def part(section: Section) -> Part:
     settings = {
         "machine": section.machine,
         "study": study,
+        "mean_error": section.calibration.mean_error or PUBLISHED_MEAN,
         "payloads": given.payloads,  # type: ignore[union-attr]
         "n_points": len(given.points),  # type: ignore[union-attr]
         "methods": {name: method_settings(section, name) for name in (NONE, *study.methods)},
     }
     inputs = {
         **model_inputs(section),
-        "published": PUBLISHED,
         "built_from": {name: method_inputs(section, name) for name in (NONE, *study.methods)},
     }
     return Part("points", prepare, settings, inputs)
@@ -73,7 +72,7 @@ def prepare(
     n_points: int,
     methods: Mapping[str, Mapping[str, Any]],
     built_from: Mapping[str, Mapping[str, Any]],
-    published: Path,
+    mean_error: float,
     constants: Path,
     sections: dict[str, Path],
 ) -> Work:
@@ -93,7 +92,7 @@ def prepare(
     }
     judged = functools.partial(_judged, machine, trained, conditions)
     shape = (len(points), len(payloads), 2)
-    draw = functools.partial(_drawn, study, n_points, stiffness, published_mean(published), shape)
+    draw = functools.partial(_drawn, study, n_points, stiffness, mean_error, shape)
     return Work(judged, items, draw)
 
 

@@ -1,10 +1,10 @@
 """What varies one thing: mesh, shape, size of a network, tolerance, and the crane as built."""
 
 from flexik.cases.crane.parts import fitting, mesh, points, tolerance
-from flexik.cases.crane.parts.measured.parts import measured_parts
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part
 from flexik.planar import corrections, learning_curves, shape
+from flexik.planar.measured.parts import measured_parts
 
 
 def parts(section: Section) -> list[Part]:
@@ -14,4 +14,5 @@ def parts(section: Section) -> list[Part]:
     nominal = [study.part(section) for study in (mesh, fitting, tolerance, points)]
     nominal.append(corrections.part(section, section.studies.corrections))
     curves = learning_curves.parts(section, section.studies.learning_curves)
-    return [drawn, *nominal, *curves, *measured_parts(section)]
+    measured = measured_parts(section, section.studies.measured)
+    return [drawn, *nominal, *curves, *measured]

@@ -1,14 +1,16 @@
-"""The picture of the machine, rigid and loaded; errors by number of samples."""
+"""The picture of the machine, errors by number of samples, and what is measured as built."""
 
 from flexik.cases.general.section import Picture, Section
 from flexik.datasets.parts import Part
 from flexik.planar import learning_curves, shape
+from flexik.planar.measured.parts import measured_parts
 
 
 def parts(section: Section) -> list[Part]:
-    """`shape` and `learning_curves/NETWORK`."""
+    """`shape`, `learning_curves/NETWORK`, and those of planar.measured."""
     middle = [sum(drive.limits) / 2 for drive in section.machine.drives.values()]
     loaded = Picture(values=middle, payload=section.largest_payload)
-    shown = section.studies.picture or loaded
+    shown, measured = section.studies.picture or loaded, section.studies.measured
     curves = learning_curves.parts(section, section.studies.learning_curves)
-    return [shape.part(section, shown.values, shown.payload), *curves]
+    drawn = shape.part(section, shown.values, shown.payload)
+    return [drawn, *curves, *(measured_parts(section, measured) if measured else [])]

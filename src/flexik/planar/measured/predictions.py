@@ -1,20 +1,19 @@
-"""How well a crane adapted to some measurements predicts the others."""
+"""How well a machine adapted to some measurements predicts the others."""
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from flexik.cases.crane.measured_section import Expected
-from flexik.cases.crane.parts.crane import FlexibleCrane
-from flexik.cases.crane.parts.measured.adapted import (
+from flexik.planar.measured.adapted import (
     FEWEST,
     Measurements,
+    Nominal,
     identify,
     predicted_tip,
     surprise,
 )
-from flexik.cases.crane.parts.measured.fields import MEASURED, STROKES, TARGET
-from flexik.positioning.method import Array, Network
+from flexik.planar.measured.fields import MEASURED, TARGET, values_of
+from flexik.positioning.method import Array
 
 # Standard deviations beyond which a measurement is left out
 OUTLIER = 5.0
@@ -24,51 +23,50 @@ ROUNDS = 8
 MEDIAN_SQUARE = 2 * np.log(2)
 
 
-def measurements(rows: pd.DataFrame) -> Measurements:
+def measurements(nominal: Nominal, rows: pd.DataFrame) -> Measurements:
     """What `rows` of the campaign measured."""
     return Measurements(
-        rows[STROKES].to_numpy(),
+        rows[values_of(nominal.machine)].to_numpy(),
         rows["payload"].to_numpy(),
         rows[MEASURED].to_numpy(),
     )
 
 
-def predictions(
-    crane: FlexibleCrane, network: Network, campaign: pd.DataFrame, settings: Expected
-) -> pd.DataFrame:
+def predictions(nominal: Nominal, campaign: pd.DataFrame) -> pd.DataFrame:
     """Measured points beside their predictions.
 
     Parameters
     ----------
-    crane, network, settings
-        As `identify` takes them.
+    nominal
+        As `identify` takes it.
     campaign
-        Frame with the columns fields.CAMPAIGN, all strokes known.
+        Frame with the columns `campaign_fields`, all coordinates known.
 
     Returns
     -------
     DataFrame
-        fields.PREDICTIONS, a row for each of `campaign`. A row is predicted by a crane adapted to
-        the rows of all other targets (where no targets are known, of all other strokes) but those
-        that stand out: the worst is dropped as long as there is one, so that a slip does not spoil
-        the predictions of the others.
+        fields.PREDICTIONS, a row for each of `campaign`. A row is predicted by a machine adapted to
+        the rows of all other targets (where no targets are known, of all other coordinates) but
+        those that stand out: the worst is dropped as long as there is one, so that a slip does not
+        spoil the predictions of the others.
     """
-    everything = measurements(campaign)
-    keys = TARGET if campaign[TARGET].notna().all(axis=None) else STROKES
+    everything = measurements(nominal, campaign)
+    known_targets = campaign[TARGET].notna().all(axis=None)
+    keys = TARGET if known_targets else values_of(nominal.machine)
     group = campaign.groupby(keys, sort=False).ngroup().to_numpy()
-    nominal = predicted_tip(crane, network, None, everything.strokes, everything.payload)
-    before = surprise(crane, network, everything, settings)
+    unadapted = predicted_tip(nominal, None, everything.values, everything.payload)
+    before = surprise(nominal, everything)
     used = ~outliers(before, before)
     for n_dropped in range(ROUNDS + 1):
         adapted, distance = np.full((2, len(campaign)), np.nan)
         for number in range(group.max() + 1):
             rows = group == number
             if np.sum(used & ~rows) >= FEWEST:
-                offsets = identify(crane, network, everything[used & ~rows], settings)
+                offsets = identify(nominal, everything[used & ~rows])
                 left = everything[rows]
-                tip = predicted_tip(crane, network, offsets, left.strokes, left.payload)
+                tip = predicted_tip(nominal, offsets, left.values, left.payload)
                 adapted[rows] = np.linalg.norm(left.tip - tip, axis=1)
-                distance[rows] = surprise(crane, network, left, settings, offsets)
+                distance[rows] = surprise(nominal, left, offsets)
         known = np.where(np.isnan(distance), before, distance)
         worst = int(np.argmax(np.where(used, known, 0.0)))
         if n_dropped == ROUNDS or known[worst] <= OUTLIER:
@@ -76,7 +74,7 @@ def predictions(
         used[worst] = False
     used = ~outliers(known, known[used])
     return campaign[["line", "payload", *MEASURED]].assign(
-        nominal_error=np.linalg.norm(everything.tip - nominal, axis=1),
+        nominal_error=np.linalg.norm(everything.tip - unadapted, axis=1),
         adapted_error=adapted,
         surprise=before,
         left_out_surprise=distance,

@@ -8,8 +8,8 @@ with it; table 4.2 has the errors from the targets, table 4.3 those from the poi
 import numpy as np
 import pandas as pd
 
-from flexik.cases.crane.parts.measured.fields import MEASURED, TARGET
 from flexik.errors import DataError
+from flexik.planar.measured.fields import MEASURED, TARGET
 
 REFERENCE_METHOD, REFERENCE_PAYLOAD = "combined", 0.0  # of the points of reference
 
@@ -29,7 +29,7 @@ def campaign_errors(campaign: pd.DataFrame) -> pd.DataFrame:
         `campaign`, rows by method, point and payload, with point (0, 1, ... as the targets first
         come), error_x, error_y (target minus measured point) and error (its length); and
         reference_error_x, reference_error_y and reference_error, which count from the point that
-        the compensated crane reached with 0 kg at the same target. SI units.
+        the compensated machine reached with 0 kg at the same target. SI units.
 
     Raises
     ------

@@ -1,18 +1,19 @@
-"""Studies of the measured crane as parts."""
+"""Studies of the measured machine as parts."""
 
 from typing import Any
 
-from flexik.cases.crane.parts.measured import adaptation, budget, campaign, identified
-from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part
 from flexik.planar.constants import model_inputs
+from flexik.planar.measured import adaptation, budget, campaign, identified
+from flexik.planar.measured.section import Measured
 from flexik.planar.methods import method_settings
+from flexik.planar.section import PlanarSection
 
 
-def measured_parts(section: Section) -> list[Part]:
-    """`measured/campaign`, `measured/budget`, `measured/identified` and `measured/adaptation`."""
-    measured, machine = section.studies.measured, section.machine
-    # what stands in for a crane does not hang on whether there is one
+def measured_parts(section: PlanarSection, measured: Measured) -> list[Part]:
+    """`measured/campaign`, `measured/identified`, `measured/adaptation` and `measured/budget`."""
+    machine = section.machine
+    # what stands in for a machine does not hang on whether there is one
     built = measured.campaign.model_copy(update={"file": None})
     model, trained_in = model_inputs(section), section.data / "networks"
     names = measured.methods
@@ -45,10 +46,13 @@ def measured_parts(section: Section) -> list[Part]:
         "network": networks[names["adaptation"]],
         "campaign": section.data / "studies/measured/campaign.parquet",
     }
-    every = inputs | ({} if restarts is None else {"restarts": restarts})
-    return [
+    found = [
         made,
-        Part("measured/budget", budget.prepare, compensated | {"budget": measured.budget}, every),
         Part("measured/identified", identified.prepare, learning, other),
         Part("measured/adaptation", adaptation.prepare, judging, model | {"networks": networks}),
     ]
+    if measured.budget is not None:
+        every = inputs | ({} if restarts is None else {"restarts": restarts})
+        of_budget = compensated | {"budget": measured.budget}
+        found.append(Part("measured/budget", budget.prepare, of_budget, every))
+    return found

@@ -1,18 +1,13 @@
-"""Measuring on a crane as built: it is drawn, approached and measured."""
+"""Measuring on a machine as built: it is drawn, approached and measured."""
 
 from collections.abc import Hashable, Mapping
 from typing import TypeVar
 
 import numpy as np
 
-from flexik.cases.crane.parts.crane import FlexibleCrane
 from flexik.machines.deviations import Magnitudes
-from flexik.multibody.as_built import (
-    AsBuilt,
-    actual_strokes,
-    draw_twin,
-    settled_tips,
-)
+from flexik.multibody.as_built import AsBuilt, actual_strokes, draw_twin, settled_tips
+from flexik.multibody.flexible import FlexibleMachine
 from flexik.positioning.method import Array
 
 Generator = np.random.Generator
@@ -20,9 +15,9 @@ Name = TypeVar("Name", bound=Hashable)
 
 
 def twin_and_generator(
-    nominal: FlexibleCrane, magnitudes: Magnitudes, seed: int
+    nominal: FlexibleMachine, magnitudes: Magnitudes, seed: int
 ) -> tuple[AsBuilt, Generator]:
-    """The crane that `seed` draws around the `nominal` one, and what draws its approaches."""
+    """The machine that `seed` draws around the `nominal` one, and what draws its approaches."""
     return draw_twin(nominal, magnitudes, seed), np.random.default_rng((seed, 1))
 
 
@@ -33,7 +28,7 @@ def measured_tips(
     noise: float | None,
     generator: Generator,
 ) -> dict[Name, Array]:
-    """Measured tips (n, 2) in m by method, at commanded `strokes` (n, 3) in m by method.
+    """Measured tips (n, 2) in m by method, at commanded `strokes` (n, k) by method.
 
     payload : (n,) in kg.
     noise : standard deviation of a measured coordinate, m; None: the tips themselves.

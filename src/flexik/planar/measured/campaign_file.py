@@ -1,4 +1,4 @@
-"""Measurements of a real crane, from a CSV that its user fills in."""
+"""Measurements of a real machine, from a CSV that its user fills in."""
 
 import csv
 from collections.abc import Sequence
@@ -8,42 +8,49 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from flexik.cases.crane.parts.measured.errors import REFERENCE_METHOD, REFERENCE_PAYLOAD
-from flexik.cases.crane.parts.measured.fields import CAMPAIGN, MEASURED, METHODS, STROKES, TARGET
 from flexik.errors import DataError
-from flexik.kinematics.crane import CraneGeometry, forward, smallest_extension
+from flexik.kinematics.loops import Linkage
+from flexik.kinematics.machine_file import manipulator_of
+from flexik.machines.planar import PlanarMachine
+from flexik.planar.fields import coordinates
+from flexik.planar.measured.errors import REFERENCE_METHOD, REFERENCE_PAYLOAD
+from flexik.planar.measured.fields import MEASURED, METHODS, TARGET, campaign_fields
 
 Rows = list[tuple[int, list[str]]]  # line numbers and cells
 
 # Columns of the file with their units; the frame's names have none
 ALWAYS = ("payload_kg", "measured_x_m", "measured_y_m")
 POSITIONING = ("method", "target_x_m", "target_y_m")
-ADAPTATION = ("lift_stroke_m", "jib_stroke_m", "extension_stroke_m")
-COLUMNS = (*POSITIONING, "payload_kg", *ADAPTATION, "measured_x_m", "measured_y_m")
 
-# Beyond these a number is in another unit, or slipped: a crane of this kind reaches 7 m, and misses
-# by centimetres. Smaller slips show in the surprise of a measurement, see predictions.py
-LARGEST_LENGTH = 50.0  # m
-LARGEST_PAYLOAD = 1e5  # kg
-LARGEST_ERROR = 0.5  # m
-# a sensor may say a little beyond the ends of its cylinder, m
-STROKE_TOLERANCE = 0.01
+# Beyond these a number is in another unit, or slipped. Smaller slips show in the surprise of a
+# measurement, see predictions.py
+LARGEST = {"kg": (0.0, 1e5), "m": (-50.0, 50.0), "rad": (-10.0, 10.0)}
+# How far from where it should be a point is measured, in shares of the largest distance from the
+# origin: cranes miss by centimetres of 7 m, a long slender boom sags by a metre of 30 m
+LARGEST_ERROR = 0.07
+# A sensor may say a little beyond the limits of its drive, in shares of its range
+BEYOND = 0.02
 POINT = "({target_x:g}, {target_y:g})"
 
 
-def read_campaign(path: Path | str) -> pd.DataFrame:
-    """Measurements of the CSV `path`, checked.
+def coordinate_columns(machine: PlanarMachine) -> tuple[str, ...]:
+    """Columns of coordinates in the file: the strokes in m and angles in rad of the drives."""
+    return tuple(f"{field.name}_{field.unit}" for field in coordinates(machine))
+
+
+def read_campaign(path: Path | str, machine: PlanarMachine) -> pd.DataFrame:
+    """Measurements of the CSV `path` on `machine`, checked.
 
     The first line that is not empty and does not begin with `#` names the columns, in any order:
 
     - `payload_kg`, `measured_x_m`, `measured_y_m`: always. The load, and where the tip came to
-      rest; x forward and y up from the ground at the slew axis, as everywhere.
+      rest; x forward and y up, as on the ground of the machine file.
     - `method`, `target_x_m`, `target_y_m`: for the tables of positioning errors. The method is
-      `none` (strokes of the rigid model) or `combined` (compensated). Each target is approached
+      `none` (coordinates of the rigid model) or `combined` (compensated). Each target is approached
       once with each of its payloads under both methods; 0 kg is one of the payloads, because
       the point that `combined` reaches with it is the reference of table 4.3.
-    - `lift_stroke_m`, `jib_stroke_m`, `extension_stroke_m`: to correct the compensator. The strokes
-      that were commanded.
+    - `DRIVE_stroke_m` or, of a revolute drive, `DRIVE_angle_rad` for every drive: to correct the
+      compensator. The coordinates that were commanded.
 
     One of the two groups, or both. Numbers have a decimal point; cells are separated by commas.
 
@@ -55,10 +62,8 @@ def read_campaign(path: Path | str) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns line (of the file) and those of the file without their units (payload in kg, the
-        others in m), in the order method, target_x, target_y, payload, lift_stroke, jib_stroke,
-        extension_stroke, measured_x, measured_y; those of a missing group are absent. Rows in the
-        order of the file.
+        Columns line (of the file) and those of the file without their units, in the order of
+        `campaign_fields`; those of a missing group are absent. Rows in the order of the file.
 
     Raises
     ------
@@ -67,7 +72,7 @@ def read_campaign(path: Path | str) -> pd.DataFrame:
         expected.
     """
     (first, names), rows = _split(path)
-    _check_header(path, first, names)
+    _check_header(path, first, names, coordinate_columns(machine))
     for number, cells in rows:
         if len(cells) != len(names):
             raise DataError(
@@ -79,38 +84,55 @@ def read_campaign(path: Path | str) -> pd.DataFrame:
     if "method" in table:
         message = f"column method: expected one of {list(METHODS)}, got {{method!r}}"
         _expect(path, table, table["method"].isin(METHODS), message)
-    found = table[["line", *(name for name in COLUMNS if name in names)]].copy()
+    columns = columns_of(coordinate_columns(machine))
+    found = table[["line", *(name for name in columns if name in names)]].copy()
     for name in names:
         if name != "method":
             found[name] = _numbers(path, table[["line", name]], name)
     found = found.rename(columns=_without_unit)
     if "method" in found:
-        _check_positioning(path, found)
+        _check_positioning(path, found, _farthest(machine))
     _check_repeated(path, found, list(found.columns[1:]))
     return found
 
 
-def own_campaign(file: Path | str, geometry: CraneGeometry) -> pd.DataFrame:
-    """Campaign in `file` with the columns CAMPAIGN, NaN and no text for what it leaves out.
+def own_campaign(file: Path | str, machine: PlanarMachine) -> pd.DataFrame:
+    """Campaign in `file`, columns `campaign_fields`, NaN and no text for what it leaves out.
 
-    Raises DataError, naming the line, as `read_campaign` does, and if the rigid crane of `geometry`
-    does not reach a target, a stroke is beyond its cylinder, or a tip was measured far from where
-    its strokes put the rigid crane.
+    Raises DataError, naming the line, as `read_campaign` does, and if the rigid `machine` does not
+    reach a target, a coordinate is beyond its drive, or a tip was measured far from where its
+    coordinates put the rigid machine.
     """
-    table = read_campaign(file)
+    table, manipulator = read_campaign(file, machine), manipulator_of(machine)
+    lower, upper = manipulator.lower, manipulator.upper
     if "method" in table:
-        reached = np.isfinite(smallest_extension(geometry, table[TARGET].to_numpy()))
-        _expect(file, table, reached, f"the rigid crane does not reach the target {POINT} m")
-    if STROKES[0] in table:
-        for name, longest in zip(STROKES, geometry.stroke_maximum, strict=True):
-            inside = table[name].between(-STROKE_TOLERANCE, longest + STROKE_TOLERANCE)
-            message = f"{name} {{{name}:g}} m, expected 0 to {longest:g} m"
+        middle = np.tile((lower + upper) / 2, (len(table), 1))
+        reached = manipulator.inverse(table[TARGET].to_numpy(), middle).reached
+        _expect(file, table, reached, f"the rigid machine does not reach the target {POINT} m")
+    fields = coordinates(machine)
+    if fields[0].name in table:
+        for field, low, high in zip(fields, lower, upper, strict=True):
+            slack = BEYOND * (high - low)
+            inside = table[field.name].between(low - slack, high + slack)
+            limits = f"{low:g} to {high:g} {field.unit}"
+            message = f"{field.name} {{{field.name}:g}} {field.unit}, expected {limits}"
             _expect(file, table, inside, message)
-        strokes = np.clip(table[STROKES].to_numpy(), 0.0, geometry.stroke_maximum)
-        where = "where these strokes put the rigid crane"
-        _check_near(file, table, forward(geometry, strokes), where)
-    missing = (field for field in CAMPAIGN if field.name not in table)
+        values = np.clip(table[[field.name for field in fields]].to_numpy(), lower, upper)
+        where = "where these coordinates put the rigid machine"
+        _check_near(file, table, manipulator.forward(values), where, _farthest(machine))
+    missing = (field for field in campaign_fields(machine) if field.name not in table)
     return table.assign(**{f.name: "" if f.dtype == "string" else np.nan for f in missing})
+
+
+def columns_of(given: tuple[str, ...]) -> tuple[str, ...]:
+    """All columns that a file may have, with those `given` of coordinates."""
+    return (*POSITIONING, "payload_kg", *given, "measured_x_m", "measured_y_m")
+
+
+def _farthest(machine: PlanarMachine) -> float:
+    """How far from where it should be a point may be, m."""
+    linkage = Linkage(machine)
+    return LARGEST_ERROR * float(np.linalg.norm(linkage.tip(linkage.starts[1])[0], axis=1).max())
 
 
 def _expect(path: Path | str, table: pd.DataFrame, good: ArrayLike, message: str) -> None:
@@ -138,24 +160,26 @@ def _split(path: Path | str) -> tuple[tuple[int, list[str]], Rows]:
     return used[0], used[1:]
 
 
-def _check_header(path: Path | str, number: int, names: Sequence[str]) -> None:
-    where = f"{path}, line {number}"
+def _check_header(
+    path: Path | str, number: int, names: Sequence[str], adaptation: tuple[str, ...]
+) -> None:
+    where, columns = f"{path}, line {number}", columns_of(adaptation)
     if len(names) == 1:
         raise DataError(f"{where}: expected columns separated by commas, got {names[0]!r}")
     for name in names:
-        if name in COLUMNS:
+        if name in columns:
             continue
-        meant = [c for c in COLUMNS if f"{name}_".startswith(f"{_without_unit(c)}_")]
-        expected = f"{meant[0]!r} (its unit in its name)" if meant else f"one of {list(COLUMNS)}"
+        meant = [c for c in columns if f"{name}_".startswith(f"{_without_unit(c)}_")]
+        expected = f"{meant[0]!r} (its unit in its name)" if meant else f"one of {list(columns)}"
         raise DataError(f"{where}: expected as column {expected}, got {name!r}")
-    if repeated := [name for name in COLUMNS if list(names).count(name) > 1]:
+    if repeated := [name for name in columns if list(names).count(name) > 1]:
         raise DataError(f"{where}: expected each column once, got {repeated} more often")
     if missing := [name for name in ALWAYS if name not in names]:
         raise DataError(f"{where}: expected the columns {missing} too")
-    found = [group for group in (POSITIONING, ADAPTATION) if set(group) & set(names)]
+    found = [group for group in (POSITIONING, adaptation) if set(group) & set(names)]
     if not found:
         raise DataError(
-            f"{where}: expected the columns {list(POSITIONING)}, {list(ADAPTATION)} or both"
+            f"{where}: expected the columns {list(POSITIONING)}, {list(adaptation)} or both"
         )
     for group in found:
         if missing := [name for name in group if name not in names]:
@@ -174,19 +198,17 @@ def _numbers(path: Path | str, table: pd.DataFrame, name: str) -> pd.Series:
             return np.nan
 
     values = table[name].map(number).astype(float)
-    where, load = f"column {name}: expected", name.endswith("_kg")
+    where, unit = f"column {name}: expected", name.rpartition("_")[2]
     _expect(path, table, np.isfinite(values), f"{where} a number, got {{{name}!r}}")
-    low, high, unit = (
-        (0.0, LARGEST_PAYLOAD, "kg") if load else (-LARGEST_LENGTH, LARGEST_LENGTH, "m")
-    )
+    low, high = LARGEST[unit]
     message = f"{where} {low:g} to {high:g} {unit}, got {{{name}}}"
     _expect(path, table, values.between(low, high), message)
     return values
 
 
-def _check_positioning(path: Path | str, table: pd.DataFrame) -> None:
+def _check_positioning(path: Path | str, table: pd.DataFrame, farthest: float) -> None:
     """Raise DataError unless every condition was measured once by both methods, 0 kg among them."""
-    _check_near(path, table, table[TARGET].to_numpy(), "its target")
+    _check_near(path, table, table[TARGET].to_numpy(), "its target", farthest)
     keys = ["method", *TARGET, "payload"]
     _check_repeated(path, table, keys)
     known = set(table[keys].itertuples(index=False, name=None))
@@ -199,11 +221,13 @@ def _check_positioning(path: Path | str, table: pd.DataFrame) -> None:
         _expect(path, wanted, there, f"expected {line} too{what}")
 
 
-def _check_near(path: Path | str, table: pd.DataFrame, points: ArrayLike, what: str) -> None:
-    """Raise DataError unless each point was measured within LARGEST_ERROR of `points` (n, 2)."""
+def _check_near(
+    path: Path | str, table: pd.DataFrame, points: ArrayLike, what: str, farthest: float
+) -> None:
+    """Raise DataError unless each point was measured within `farthest` m of `points` (n, 2)."""
     away = np.linalg.norm(table[MEASURED].to_numpy() - points, axis=1)
-    message = f"expected a point within {LARGEST_ERROR:g} m of {what}, got one {{away:.3g}} m away"
-    _expect(path, table.assign(away=away), away <= LARGEST_ERROR, message)
+    message = f"expected a point within {farthest:.1g} m of {what}, got one {{away:.3g}} m away"
+    _expect(path, table.assign(away=away), away <= farthest, message)
 
 
 def _check_repeated(path: Path | str, table: pd.DataFrame, keys: list[str]) -> None:
@@ -213,4 +237,6 @@ def _check_repeated(path: Path | str, table: pd.DataFrame, keys: list[str]) -> N
 
 
 def _without_unit(name: str) -> str:
-    return name.removesuffix("_kg").removesuffix("_m")
+    for unit in LARGEST:
+        name = name.removesuffix(f"_{unit}")
+    return name

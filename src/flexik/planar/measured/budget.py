@@ -1,4 +1,4 @@
-"""What each deviation of a crane as built does to its errors: the campaign on many such cranes."""
+"""What each deviation of a machine as built does to its errors: the campaign on many of them."""
 
 import functools
 from collections.abc import Mapping
@@ -8,35 +8,41 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from flexik.cases.crane.measured_section import Budget, Campaign
-from flexik.cases.crane.parts.crane import FlexibleCrane, flexible
-from flexik.cases.crane.parts.measured.errors import campaign_errors
-from flexik.cases.crane.parts.measured.fields import BUDGET, MEASURED
-from flexik.cases.crane.parts.measured.nominal import approaches, read_network
-from flexik.cases.crane.parts.measured.twins import measured_tips, twin_and_generator
 from flexik.datasets.parts import Columns, Work, Writer, stacked, table
-from flexik.learning.storage import load_restarts
+from flexik.learning.storage import load_network, load_restarts
 from flexik.machines.deviations import Magnitudes
 from flexik.machines.planar import PlanarMachine
+from flexik.multibody.flexible import FlexibleMachine
+from flexik.planar.machine import flexible
+from flexik.planar.measured.errors import campaign_errors
+from flexik.planar.measured.fields import BUDGET, MEASURED
+from flexik.planar.measured.nominal import approaches
+from flexik.planar.measured.section import Budget, Campaign
+from flexik.planar.measured.twins import measured_tips, twin_and_generator
 from flexik.positioning import combined
 from flexik.positioning.method import Array
 
-# the spread of play belongs to the play
-BELONGS = {"play_spread": "play"}
+# Belong to another kind; the spread of play does not grow with it
+BELONGS = {
+    "play_spread": "play",
+    "angle_offset": "stroke_offset",
+    "angle_repeatability": "repeatability",
+}
+STAYS = "play_spread"
 
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What all cranes share; the campaign is measured at the query (n, 3)."""
+    """What all machines share; the campaign is measured at the query (n, 3)."""
 
-    crane: FlexibleCrane
+    nominal: FlexibleMachine
     campaign: Campaign
     query: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Item:
-    """A crane by its number, with these kinds of deviations; strokes (n, 3) in m by method."""
+    """A machine by its number, with these kinds of deviations; coordinates (n, k) by method."""
 
     number: int
     kinds: Mapping[tuple[str, float], Magnitudes]
@@ -50,29 +56,29 @@ def prepare(
     budget: Budget,
     method: combined.Settings,
     network: Path,
-    constants: Path,
     sections: object,
+    constants: Path | None = None,
     restarts: Path | None = None,
 ) -> Work:
-    """A table of BUDGET, an item a crane with all its kinds of deviations.
+    """A table of BUDGET, an item a machine with all its kinds of deviations.
 
-    `.restarts.parquet` is one of cranes without deviations, each compensated by the network of
+    `.restarts.parquet` is one of machines without deviations, each compensated by the network of
     another of the `restarts` of which `network` is the best; `twin` is the restart.
     """
-    crane, given = flexible(machine, constants), campaign.deviations
-    strokes, query = approaches(crane, method, read_network(network), campaign)
-    items = [Item(k, kinds(given, budget.factor), strokes) for k in range(budget.n_cranes)]
+    nominal, given = flexible(machine, constants), campaign.deviations
+    strokes, query = approaches(machine, method, load_network(network)[0], campaign)
+    items = [Item(k, kinds(given, budget.factor), strokes) for k in range(budget.n_twins)]
     others = {} if restarts is None else load_restarts(restarts)
     perfect = {kind: sizes for kind, sizes in items[0].kinds.items() if kind[0] == "none"}
     for number, other in others.items():
-        items.append(Item(number, perfect, approaches(crane, method, other, campaign)[0]))
+        items.append(Item(number, perfect, approaches(machine, method, other, campaign)[0]))
 
     def finish(results: list[Columns]) -> Mapping[str, Writer]:
-        tables = {".parquet": results[: budget.n_cranes]}
-        tables[".restarts.parquet"] = results[budget.n_cranes :]
+        tables = {".parquet": results[: budget.n_twins]}
+        tables[".restarts.parquet"] = results[budget.n_twins :]
         return {ending: table(stacked(found, BUDGET), BUDGET) for ending, found in tables.items()}
 
-    return Work(functools.partial(errors_of, Study(crane, campaign, query)), items, finish)
+    return Work(functools.partial(errors_of, Study(nominal, campaign, query)), items, finish)
 
 
 def kinds(given: Magnitudes, factor: float) -> dict[tuple[str, float], Magnitudes]:
@@ -84,19 +90,20 @@ def kinds(given: Magnitudes, factor: float) -> dict[tuple[str, float], Magnitude
         if name not in BELONGS:
             own = {key: size for key, size in sizes.items() if BELONGS.get(key, key) == name}
             found[name, 0.0] = none | own
-            found[name, factor] = sizes | {name: factor * sizes[name]}
+            larger = {key: factor * size for key, size in own.items() if key != STAYS}
+            found[name, factor] = sizes | larger
     return {kind: given.model_copy(update=changed) for kind, changed in found.items()}
 
 
 def errors_of(study: Study, item: Item) -> Columns:
-    """Errors of the campaign on a crane, from targets and points of reference."""
+    """Errors of the campaign on a machine, from targets and points of reference."""
     campaign, strokes = study.campaign, item.strokes
     x, y, payload = np.tile(study.query, (len(strokes), 1)).T
     conditions = {"target_x": x, "target_y": y, "payload": payload}
     method = np.repeat(list(strokes), len(study.query))
     tables = []
     for (deviation, factor), magnitudes in item.kinds.items():
-        twin, generator = twin_and_generator(study.crane, magnitudes, campaign.seed + item.number)
+        twin, generator = twin_and_generator(study.nominal, magnitudes, campaign.seed + item.number)
         tips = measured_tips(twin, strokes, study.query[:, 2], campaign.noise, generator)
         measured = dict(zip(MEASURED, np.concatenate(list(tips.values())).T, strict=True))
         errors = campaign_errors(pd.DataFrame({"method": method, **conditions, **measured}))

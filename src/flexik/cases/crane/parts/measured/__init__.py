@@ -1,1 +1,0 @@
-"""The measured crane: campaign, error budget, identification and adaptation."""

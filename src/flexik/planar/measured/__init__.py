@@ -1,0 +1,1 @@
+"""A measured machine: campaign, error budget, identification and adaptation."""
