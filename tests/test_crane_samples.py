@@ -210,7 +210,7 @@ def test_tips_of_one_extension_together_are_the_tips_in_their_order(crane, comma
     assert again == pytest.approx(found[order], abs=2e-7)
     assert tips(crane, np.empty((0, 3)), np.empty(0)).shape == (0, 2)
     with pytest.raises(SolverError):
-        tips(crane, strokes, np.where(np.arange(len(payload)) == 2, 1e7, payload))
+        tips(crane, strokes, np.where(np.arange(len(payload)) == 2, 1e9, payload))
 
 
 def test_strokes_that_do_not_assemble_fail_and_are_not_left_out(crane):
