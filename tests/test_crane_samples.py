@@ -148,7 +148,7 @@ def mixed():
     strokes = np.array(
         [[0.2, 0.1, 0.4], [0.535, 0.78, 0.4], [0.2, 0.1, 0.4], [0.3, 0.2, 0.4], [0.3, 0.2, 0.8]]
     )
-    return Samples(strokes, np.array([100.0, 100.0, 1e7, 200.0, 200.0]))
+    return Samples(strokes, np.array([100.0, 100.0, 1e9, 200.0, 200.0]))
 
 
 def test_every_sample_is_a_row_with_its_status(crane, mixed):
@@ -168,7 +168,7 @@ def test_every_sample_is_a_row_with_its_status(crane, mixed):
     assert table.drop(columns=["tip_x", "tip_y"]).notna().all(axis=None)
     assert counts(table) == {"n_samples": 5, "n_kept": 3, "n_left_out": 1, "n_failed": 1}
     assert failed_samples(crane_case.MACHINE, table) == [
-        "lift_stroke 0.2, jib_stroke 0.1, extension_stroke 0.4, payload 1e+07"
+        "lift_stroke 0.2, jib_stroke 0.1, extension_stroke 0.4, payload 1e+09"
     ]
     usable = kept(table)
     assert usable.index.tolist() == [0, 1, 2]
