@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -32,6 +33,14 @@ def crane(stiffness=SPRING):
         found = FlexibleCrane(section().machine.with_constants({SPRING_KEY: stiffness}))
         found.beams  # noqa: B018  they are read
         return found
+
+
+def upright(crane, element):
+    """`crane` of other elements, its pillar upright: the axes of some must be straight."""
+    straight = {"axis": ((0.0, -0.311), (0.0, 1.115)), "mass_span": (0.03, 1.115)}
+    changes = {f"bodies.pillar.{key}": value for key, value in straight.items()}
+    machine = crane.machine.with_constants({"element": element} | changes)
+    return replace(crane, machine=machine)
 
 
 def samples(columns):

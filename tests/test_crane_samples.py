@@ -148,7 +148,7 @@ def mixed():
     strokes = np.array(
         [[0.2, 0.1, 0.4], [0.535, 0.78, 0.4], [0.2, 0.1, 0.4], [0.3, 0.2, 0.4], [0.3, 0.2, 0.8]]
     )
-    return Samples(strokes, np.array([100.0, 100.0, 1e7, 200.0, 200.0]))
+    return Samples(strokes, np.array([100.0, 100.0, 1e9, 200.0, 200.0]))
 
 
 def test_every_sample_is_a_row_with_its_status(crane, mixed):
@@ -168,7 +168,7 @@ def test_every_sample_is_a_row_with_its_status(crane, mixed):
     assert table.drop(columns=["tip_x", "tip_y"]).notna().all(axis=None)
     assert counts(table) == {"n_samples": 5, "n_kept": 3, "n_left_out": 1, "n_failed": 1}
     assert failed_samples(crane_case.MACHINE, table) == [
-        "lift_stroke 0.2, jib_stroke 0.1, extension_stroke 0.4, payload 1e+07"
+        "lift_stroke 0.2, jib_stroke 0.1, extension_stroke 0.4, payload 1e+09"
     ]
     usable = kept(table)
     assert usable.index.tolist() == [0, 1, 2]
@@ -210,7 +210,7 @@ def test_tips_of_one_extension_together_are_the_tips_in_their_order(crane, comma
     assert again == pytest.approx(found[order], abs=2e-7)
     assert tips(crane, np.empty((0, 3)), np.empty(0)).shape == (0, 2)
     with pytest.raises(SolverError):
-        tips(crane, strokes, np.where(np.arange(len(payload)) == 2, 1e7, payload))
+        tips(crane, strokes, np.where(np.arange(len(payload)) == 2, 1e9, payload))
 
 
 def test_strokes_that_do_not_assemble_fail_and_are_not_left_out(crane):

@@ -176,7 +176,7 @@ def test_play_of_a_cylinder_is_a_stroke_that_follows_its_force(crane, drive):
 
 @pytest.mark.parametrize("element", ["geometrically_exact", "ancf"])
 def test_forces_are_nearly_those_of_the_rigid_crane(crane, samples, element):
-    crane = replace(crane, machine=crane.machine.with_constants({"element": element}))
+    crane = crane_case.upright(crane, element)
     loads = -9.81 * samples.payload[:, None] * [0.0, 1.0]
     expected = joint_forces(crane.machine, crane.linkage.poses(samples.values), loads)
     for k, (strokes, payload) in enumerate(zip(samples.values, samples.payload, strict=True)):
@@ -220,7 +220,7 @@ def rigid_with_play(geometry, strokes, play, found):
     "pins", [tuple(PINS), *((f"joints.{p}",) for p in ("lift_pivot", "jib_pivot", "rocker_head"))]
 )
 def test_play_moves_the_tip_as_rigid_kinematics_say(crane, samples, element, pins):
-    crane = replace(crane, machine=crane.machine.with_constants({"element": element}))
+    crane = crane_case.upright(crane, element)
     play = NONE | dict.fromkeys(pins, 4e-4)
     rows = slice(0, 5)
     strokes, payload = samples.values[rows], samples.payload[rows]

@@ -46,7 +46,7 @@ GEOMETRY = CraneGeometry(
 
 @dataclass(frozen=True)
 class Beam:
-    """A straight beam; coordinates (abscissa, lateral) of its body frame, in m.
+    """A beam; coordinates (abscissa, lateral) of its body frame, in m.
 
     start, end, axis : abscissae of the ends, lateral coordinate of the axis.
     section : (n, 3) rows of x in m, Iz in m4, A in m2; end values hold beyond.
@@ -54,6 +54,7 @@ class Beam:
     mass_span : abscissae between which density is proportional to A(x) (a + b x).
     mass_offset : lateral distance of the centre of mass from the axis, positive to the left.
     pins : pin points, joined to the axis point of the same abscissa by a rigid arm.
+    corner : abscissa at which the axis turns to the left, and the angle in rad.
     """
 
     start: float
@@ -65,6 +66,7 @@ class Beam:
     mass_span: Vector
     mass_offset: float
     pins: dict[str, Vector]
+    corner: Vector = (np.inf, 0.0)
 
 
 @dataclass(frozen=True)
@@ -139,8 +141,17 @@ class Posed(NamedTuple):
 
 def nominal_structure(spring_stiffness: float) -> Structure:
     """Return the crane of the reference data on a ground spring of N m/rad."""
-    # the pillar's body frame is the ground frame turned a quarter: abscissa y, lateral -x
-    pillar_pins = {"ground": (-0.311, 0.0), "C": (0.075, -0.17), "B": (1.115, 0.09)}
+    # the pillar's body frame is the ground frame turned a quarter: abscissa y, lateral -x; above
+    # y = -0.013 that of the box, which leans back to B
+    lean = float(np.arctan2(0.09, 1.115 + 0.013))
+
+    def on_box(x: float, y: float) -> Vector:
+        up, back = y + 0.013, -x
+        ahead = up * np.cos(lean) + back * np.sin(lean)
+        return float(ahead - 0.013), float(back * np.cos(lean) - up * np.sin(lean))
+
+    pillar_pins = {"ground": (-0.311, 0.0), "C": on_box(0.17, 0.075), "B": on_box(-0.09, 1.115)}
+    (end, _), (centre, offset) = pillar_pins["B"], on_box(-0.017, 0.577)
     lift_pins = {"B": (0.0, 0.0), "D": (0.3025, -0.105), "E": (1.2735, 0.164)}
     lift_pins |= {"F": (2.69, -0.039), "G": (2.88, -0.024)}
     jib_pins = {"I": (-0.095, 0.24), "G": (0.0, 0.0)}
@@ -148,7 +159,10 @@ def nominal_structure(spring_stiffness: float) -> Structure:
         np.loadtxt(SECTIONS / f"{name}_section.csv", delimiter=",", skiprows=1) for name in BEAMS
     )
     beams = (
-        Beam(-0.311, 1.115, 0.0, pillar, 93.26, 0.577, (0.03, 1.115), 0.017, pillar_pins),
+        Beam(
+            *(-0.311, end, 0.0, pillar, 93.26, centre, (0.03, 1.118), offset, pillar_pins),
+            corner=(-0.013, lean),
+        ),
         Beam(0.0, 2.88, 0.03, lift, 124.6, 1.12, (0.0, 2.88), 0.0, lift_pins),
         Beam(-0.446, 1.8, 0.266, jib, 76.6, 0.498, (-0.446, 1.8), -0.0265, jib_pins),
         Beam(0.0, 2.45, 0.0, extension, 58.6, 1.15, (0.0, 2.45), 0.0, {"tip": (2.45, 0.0)}),
@@ -208,7 +222,7 @@ def mesh(beam: Beam, elastic_modulus: float) -> Mesh:
     """Cells with edges at the ends, pins, rows of the section table and ends of the mass span."""
     x, inertia, area = beam.section.T
     pins = [abscissa for abscissa, _ in beam.pins.values()]
-    marks = np.concatenate([[beam.start, beam.end], pins, x, beam.mass_span])
+    marks = np.concatenate([[beam.start, beam.end, beam.corner[0]], pins, x, beam.mass_span])
     marks = np.unique(np.clip(marks, beam.start, beam.end))
     counts = np.ceil(np.diff(marks) / (beam.end - beam.start) * CELLS).astype(int) + 3
     widths = np.repeat(np.diff(marks) / counts, counts)
@@ -233,6 +247,9 @@ def place(
     curvature, strain = strains
     turns = np.append(angle, angle + np.cumsum(curvature * cells.widths))
     angles = (turns[:-1] + turns[1:]) / 2
+    at_corner, lean = beam.corner
+    angles += lean * (cells.edges[:-1] > at_corner - 1e-9)
+    turns += lean * (cells.edges > at_corner + 1e-9)
     steps = ((1 + strain) * cells.widths)[:, None] * _tangent(angles)
     nodes = np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
     pins = {}

@@ -14,9 +14,9 @@ from flexik.errors import ParameterError
 from flexik.machines.deviations import Magnitudes
 from flexik.machines.planar import Cylinder
 from flexik.machines.sections import Array
-from flexik.multibody.flexible import FlexibleMachine
+from flexik.multibody.flexible import FlexibleMachine, failed
 from flexik.multibody.joint_forces import joint_forces, pins_of, point_key, points_of, springs_of
-from flexik.multibody.model import PlanarModel, failed
+from flexik.multibody.model import PlanarModel
 from flexik.multibody.planar import solve
 
 # A force below this pushes no pin, N: some times the residual of the solver

@@ -259,28 +259,6 @@ def weigh(system: exu.MainSystem, load: int, mass: float, gravity: float) -> Non
     system.SetLoadParameter(load, "loadVector", [0.0, -mass * gravity, 0.0])
 
 
-def static_settings(tolerance: float) -> exu.SimulationSettings:
-    """Static equilibrium to the residual `tolerance` of Newton's method, N and N m."""
-    settings = exu.SimulationSettings()
-    settings.solution.file.write = False
-    settings.staticSolver.verboseMode = 0
-    settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
-    settings.staticSolver.newton.absoluteTolerance = tolerance
-    settings.staticSolver.newton.relativeTolerance = 0.0
-    # weights hardly stiffen a machine: their Jacobian only costs time
-    settings.staticSolver.computeLoadsJacobian = False
-    return settings
-
-
-def solved(system: exu.MainSystem, settings: exu.SimulationSettings) -> bool:
-    """Go from the present state to static equilibrium; whether there is one."""
-    try:
-        found = exu.MainSolverStatic().SolveSystem(system, settings)  # type: ignore[call-arg,misc]
-    except exu.SolverError:  # a singular matrix
-        return False
-    return bool(found) and bool(np.isfinite(system.systemData.GetODE2Coordinates()).all())
-
-
 def neighbours(coordinates: Array, payload: Array) -> NDArray[np.int64]:
     """Order (n,) in which each sample of coordinates (n, k) and payload (n,) is near the last one.
 

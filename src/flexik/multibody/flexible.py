@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from flexik.errors import ParameterError
+from flexik.errors import ParameterError, SolverError
 from flexik.kinematics.loops import Linkage
 from flexik.machines import bodies
 from flexik.machines.planar import GROUND, Fixed, Joint, PlanarMachine, Revolute, Slide
@@ -130,6 +130,12 @@ class FlexibleMachine:
     def sliding(self) -> list[str]:
         """Beams whose mesh follows pads."""
         return [name for name in self.beams if any(name in names for _, names, _ in self.pads)]
+
+
+def failed(machine: FlexibleMachine, values: Array, what: str) -> SolverError:
+    """An error at coordinates (k,)."""
+    given = zip(machine.machine.drives, values.tolist(), strict=True)
+    return SolverError(f"{what} at {', '.join(f'{name} {value:.6g}' for name, value in given)}")
 
 
 def _bending(beam: bodies.Beam, shear: str) -> Beam:

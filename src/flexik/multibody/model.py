@@ -4,13 +4,12 @@ Beams bend, the other bodies are rigid; pins, pads and cylinders join points of 
 their coordinates. A slide touches the inner body with one pad and the outer one with the other.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import exudyn as exu
 import numpy as np
 
-from flexik.errors import SolverError
 from flexik.machines import bodies
 from flexik.machines.planar import GROUND, Fixed, Slide
 from flexik.machines.sections import Array
@@ -23,18 +22,19 @@ from flexik.multibody.elements import (
     pin,
     place_beam,
     rotation_of,
-    solved,
     spring,
-    static_settings,
     weigh,
 )
-from flexik.multibody.flexible import FlexibleMachine, feet_of, mass_offset, places_of
+from flexik.multibody.flexible import FlexibleMachine, failed, feet_of, mass_offset, places_of
+from flexik.multibody.newton import solved, solved_exactly, static_settings
 
 # Newton's residual over the weight of machine and payload; and, where that is less, over the forces
 # in all elements by the last digit of the size of the machine: it falls to 0.1 to 0.7 of them
 TOLERANCE, LAST_DIGITS = 1e-6, 1.5
-# Share of all loads, and step of the payload, below which a stubborn equilibrium is given up
-SMALLEST_LOAD_STEP, SMALLEST_RAMP = 0.05, 1e-4
+# Step of the payload, as a share of it, below which a stubborn equilibrium is given up
+SMALLEST_RAMP = 1e-4
+
+Method = Callable[[exu.MainSystem, exu.SimulationSettings], bool]
 
 
 class PlanarModel:
@@ -166,10 +166,14 @@ class PlanarModel:
         if self._solved_with(payload):
             return
         self._unload()
-        if not self._solved_with(payload) and not self._ramped(payload):
+        if self._solved_with(payload):
+            return
+        reached = self._ramped(payload)
+        if reached < payload:
             self._unload()
             what = f"no static equilibrium with {payload:g} kg"
-            raise failed(self.flexible, self.values, what)
+            ends = f" (the last one is that with {reached:.4g} kg)" if reached > 0.0 else ""
+            raise failed(self.flexible, self.values, what + ends)
 
     def tip(self) -> Array:
         """Tip (2,) in m of the last solution."""
@@ -180,26 +184,31 @@ class PlanarModel:
         """Node positions (m, 2) in m by beam of the last solution."""
         return {name: beam.shape() for name, beam in self.beams.items()}
 
-    def _ramped(self, payload: float) -> bool:
-        """Whether the payload, put on little by little, leads to an equilibrium."""
+    def _ramped(self, payload: float) -> float:
+        """Put the payload on little by little; how much the machine can bear, kg.
+
+        Less than 0 if not even itself.
+        """
         self._unload()
-        found, on, step = self._solved_with(0.0), 0.0, payload / 8
-        while found and on < payload and step > SMALLEST_RAMP * payload:
+        if not self._solved_with(0.0, solved_exactly):
+            return -1.0
+        on, step = 0.0, payload / 2
+        while on < payload and step > SMALLEST_RAMP * payload:
             ahead = min(on + step, payload)
-            if self._solved_with(ahead):
+            if self._solved_with(ahead, solved_exactly):
                 on, step = ahead, 2 * step
             else:
                 step /= 4
-        return found and on == payload
+        return on
 
-    def _solved_with(self, payload: float) -> bool:
+    def _solved_with(self, payload: float, method: Method = solved) -> bool:
         weigh(self.system, self._payload, payload, self.machine.gravity)
         self._predict(payload)
         weight = self.machine.gravity * (self.weight + payload)
         last_digit = float(np.finfo(float).eps) * self.flexible.size
         round_off = LAST_DIGITS * last_digit * float(np.linalg.norm([*self._noise.values()]))
         _SETTINGS.staticSolver.newton.absoluteTolerance = max(TOLERANCE * weight, round_off)
-        if not solved(self.system, _SETTINGS):
+        if not method(self.system, _SETTINGS):
             return False
         data = self.system.systemData
         solution = np.array(data.GetODE2Coordinates()), np.array(data.GetAECoordinates())
@@ -387,13 +396,4 @@ class PlanarModel:
             self.weight += mass
 
 
-def failed(machine: FlexibleMachine, values: Array, what: str) -> SolverError:
-    """An error at coordinates (k,)."""
-    given = zip(machine.machine.drives, values.tolist(), strict=True)
-    return SolverError(f"{what} at {', '.join(f'{name} {value:.6g}' for name, value in given)}")
-
-
 _SETTINGS = static_settings(1.0)
-_SETTINGS.staticSolver.minimumStepSize = SMALLEST_LOAD_STEP
-# the Jacobian of such a machine hardly changes
-_SETTINGS.staticSolver.newton.useModifiedNewton = True

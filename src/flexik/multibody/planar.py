@@ -9,8 +9,8 @@ from flexik.errors import SolverError
 from flexik.machines.sections import Array
 from flexik.multibody.beams import Elements
 from flexik.multibody.elements import neighbours
-from flexik.multibody.flexible import FlexibleMachine
-from flexik.multibody.model import PlanarModel, failed
+from flexik.multibody.flexible import FlexibleMachine, failed
+from flexik.multibody.model import PlanarModel
 
 # Pads this close touch the same place, m
 SAME_PLACE = 1e-9
@@ -29,11 +29,12 @@ def solve(
 ) -> tuple[Array, dict[int, SolverError]]:
     """Tip (n, 2) in m at coordinates (n, k) with `payload` (n,) in kg, and the rows that failed.
 
-    Rows whose meshes have the same layout share one system, each starting from a neighbour; which
-    one changes a tip by less than 1e-7 m. A row without equilibrium holds NaN and is in the second
-    result, with an error that names its coordinates and payload. `read` takes something else
-    than the tip, `size` numbers, from the model of every row; `settle` finds the equilibrium in
-    place of `PlanarModel.solve`, told the number of the row.
+    Rows whose meshes have the same layout share one system, each starting from a neighbour. Which
+    one that is, and so which other rows are asked for, changes a tip by less than 1e-7 m (7e-5 mm
+    on the crane), as Newton's method stops at a tolerance. A row without equilibrium holds NaN and
+    is in the second result, with an error that names its coordinates and payload. `read` takes
+    something else than the tip, `size` numbers, from the model of every row; `settle` finds the
+    equilibrium in place of `PlanarModel.solve`, told the number of the row.
     """
     read = read or PlanarModel.tip
     values, payload = np.atleast_2d(values), np.atleast_1d(payload)

@@ -12,6 +12,7 @@ from flexik.cases.crane.parts.crane import FlexibleCrane, flexible
 from flexik.cases.crane.section import MeshStudy, Section
 from flexik.datasets.parts import Part, Work, Writer, table
 from flexik.datasets.tables import Field
+from flexik.errors import ParameterError
 from flexik.kinematics.crane import forward
 from flexik.machines.planar import PlanarMachine
 from flexik.multibody.elements import ELEMENTS
@@ -31,7 +32,7 @@ FIELDS = (
 
 
 def part(section: Section) -> Part:
-    """A row for every element and refinement."""
+    """A row for every refinement of every element that the axes of the machine allow."""
     settings = {
         "machine": section.machine,
         "study": section.studies.mesh,
@@ -54,7 +55,7 @@ def prepare(
     crane = flexible(machine, constants)
     samples = random_samples(machine, study.n_samples, payload, minimum_tip_x, study.seed)
     variants: list[tuple[str, int]] = [(machine.element, study.refinements[-1])]
-    variants += [(element, n) for element in ELEMENTS for n in study.refinements]
+    variants += [(element, n) for element in _possible(crane) for n in study.refinements]
     rigid = forward(crane.geometry, samples.values)
 
     def finish(results: list[Mapping[str, NDArray]]) -> Mapping[str, Writer]:
@@ -79,6 +80,18 @@ def _tips(
     machine = crane.machine.with_constants({"element": variant[0]})
     other = replace(crane, machine=machine, refinement=variant[1])
     return {"tip": tips(other, samples.values, samples.payload)}
+
+
+def _possible(crane: FlexibleCrane) -> list[str]:
+    """The ELEMENTS that the machine's axes allow; tells which they do not, and why."""
+    found = []
+    for element in ELEMENTS:
+        try:
+            replace(crane, machine=crane.machine.with_constants({"element": element}))
+            found.append(element)
+        except ParameterError as error:
+            print(f"mesh study without {element}: {error}")
+    return found
 
 
 def _mean(values: NDArray[np.float64]) -> float:
