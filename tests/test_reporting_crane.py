@@ -101,6 +101,15 @@ def results():
         },
         tolerances=pd.concat([study.assign(method=name) for name in ("direct", "modular")]),
         fitting=pd.concat([fitting.assign(n_hidden=n) for n in (2, 30)]),
+        by_corrections=pd.DataFrame(
+            {"method": "combined", "n_corrections": [1, 2], "n_failed": 0}
+            | {f"{what}_error": [0.002, 0.001] for what in ("mean", "p99", "max")}
+        ),
+        draws=pd.DataFrame(
+            {"draw": [0, 1], "method": "none", "spring_stiffness": [8e6, 9e6]}
+            | {f"{what}_error": [0.03, 0.031] for what in ("mean", "max")}
+        ),
+        curves=pd.DataFrame(),
         query_times=pd.DataFrame(
             {"method": names, "microseconds_single": 20.0, "microseconds_batched": 2.0}
         ),

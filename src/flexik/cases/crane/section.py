@@ -157,13 +157,13 @@ class Section(PlanarSection):
                 f"machine.{SPRING}: expected fit, and a value for everything else; a known value "
                 "stands under calibration.known"
             )
+        for name, kind in (("published", Points), ("workspace", RandomTargets)):
+            if not isinstance(self.conditions.get(name), kind):
+                raise ValueError(f"conditions.{name}: expected {kind.__name__}, which is reported")
         self._check_shape()
         self._check_fitting()
         self._check_methods()
         check_curves(self, self.studies.learning_curves)
-        for name, kind in (("published", Points), ("workspace", RandomTargets)):
-            if not isinstance(self.conditions.get(name), kind):
-                raise ValueError(f"conditions.{name}: expected {kind.__name__}, which is reported")
         return self
 
     def _check_shape(self) -> None:
