@@ -22,6 +22,7 @@ from flexik.files import read_json
 from flexik.learning.perceptron import Network
 from flexik.learning.size_selection import by_size, read_layers
 from flexik.learning.torch_module import Module
+from flexik.parameters.networks import Regressor, TorchModule
 from flexik.planar import learning_curves
 from flexik.planar.fields import kept
 from flexik.planar.learning import correction
@@ -140,7 +141,8 @@ class Results:
         published = self.published["positioning_errors"]
         for label, method in self.methods.items():
             names = {method.method: "published", f"{method.method}{SELECTED}": "selected"}
-            known = method.method in published
+            network = self.section.networks.get(method.network or "")
+            known = method.method in published and not isinstance(network, Regressor | TorchModule)
             groups[names.get(label, "variants") if known else "beyond"].append(label)
         return groups
 
