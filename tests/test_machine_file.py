@@ -208,8 +208,8 @@ MISTAKES = [
     (CRANE, "title: PATU 655 log crane", "", "title: this key is missing"),
     (
         CRANE,
-        "n_elements: 18",
-        "n_elemets: 18",
+        "n_elements: 6",
+        "n_elemets: 6",
         "lift.n_elemets: there is no such key, did you mean n_elements. .known: ",
     ),
     (

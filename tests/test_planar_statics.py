@@ -74,18 +74,19 @@ def test_cantilever(solver):
     assert found[1] == pytest.approx(-10 * G * 8 / (3 * EI), rel=1e-4)
 
 
-def test_own_weight(solver):
-    given = clamped(beam([[0, 0], [2, 0]], a=[0, 0], tip=[2, 0]))
+@pytest.mark.parametrize("n_elements", [1, 2, 8])
+def test_own_weight(solver, n_elements):
+    given = clamped(beam([[0, 0], [2, 0]], n_elements=n_elements, a=[0, 0], tip=[2, 0]))
     tip = solver(FlexibleMachine(given), np.zeros((1, 1)), np.zeros(1))[0]
     per_length = 7850 * 0.05 * 0.1 * G
-    assert tip[1] == pytest.approx(-per_length * 16 / (8 * EI), rel=0.01)
+    assert tip[1] == pytest.approx(-per_length * 16 / (8 * EI), rel=1e-3)
 
 
 def test_tapered_cantilever_by_the_unit_load(solver):
     section = SOLID | {"height": [0.2, 0.05]}
-    found = sag(solver, clamped(beam([[0, 0], [2, 0]], section, 16, a=[0, 0], tip=[2, 0])))
+    found = sag(solver, clamped(beam([[0, 0], [2, 0]], section, 5, a=[0, 0], tip=[2, 0])))
     flexibility = quad(lambda x: (2 - x) ** 2 / (E * 0.05 * (0.2 - 0.075 * x) ** 3 / 12), 0, 2)[0]
-    assert found[1] == pytest.approx(-10 * G * flexibility, rel=1e-2)
+    assert found[1] == pytest.approx(-10 * G * flexibility, rel=1e-3)
 
 
 def test_shear_as_by_timoshenko(solver):

@@ -42,7 +42,7 @@ def test_springs_are_the_inner_bodys_whatever_the_angle_of_the_joint(springs, an
     flexibility = np.outer(x, x) / springs.get("x", np.inf)
     flexibility += np.outer(y, y) / springs.get("y", np.inf)
     expected = flexibility @ [0.0, -10 * G]
-    assert sag(given, values=np.array([turned])) == pytest.approx(expected, rel=2e-3, abs=2e-6)
+    assert sag(tips, given, values=np.array([turned])) == pytest.approx(expected, rel=2e-3, abs=2e-6)
 
 
 def lifted(element, kind, direction=0.0, turned=0.0):
@@ -87,7 +87,7 @@ def test_round_off_of_short_elements_is_no_missing_equilibrium(length, n_element
     given = arm_of(arm, origin)
     values, payload = np.linspace(-1.0, 1.0, 9)[:, None], np.linspace(0.0, 100.0, 9)
     assert not solve(FlexibleMachine(given), values, payload)[1]
-    sunk = sag(given, 100.0)[1]
+    sunk = sag(tips, given, 100.0)[1]
     assert sunk == pytest.approx(-100.0 * G * length**3 / (3 * EI), rel=1e-3, abs=1e-9)
 
 
@@ -127,7 +127,7 @@ def test_corners_as_far_apart_as_that_have_nodes():
 def sag_of_light(given, *values):
     """What `sag` gives with 1 kg on a machine whose own weight hardly bends it."""
     light = {f"bodies.{name}.density": 11.0 for name in given.beams}
-    return sag(given.with_constants(light), 1.0, np.array(values))
+    return sag(tips, given.with_constants(light), 1.0, np.array(values))
 
 
 def worked(*beams):

@@ -111,7 +111,8 @@ class Beam(_Body):
     density : kg/m3 of the section, in place of mass and centre.
     mass_span : abscissas between which the mass lies, all of it if not given; the mass of a length
         follows the area times a linear factor that gives mass and centre.
-    n_elements : finite elements of equal length; points add nodes.
+    n_elements : finite elements, none longer than the beam over this; points add nodes, and where
+        the section varies there are three or more between two.
     """
 
     kind: Literal["beam"]

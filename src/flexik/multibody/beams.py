@@ -11,8 +11,11 @@ import numpy as np
 from flexik.machines.bodies import MERGE_DISTANCE, TOLERANCE
 from flexik.machines.sections import Array, Section
 
-# Of the second moment of an element's flexibility, what its neighbour may take
-MOST_MOVED = 0.8
+# Elements between two pins, if they vary
+FEWEST = 3
+# Of the flexibility of an element, what a neighbour may take; and of the second moments of all
+# between two pins, what is left at least
+MOST_TAKEN, LEAST_LEFT = 0.4, 0.1
 
 # Gauss-Legendre points and weights on [-1, 1], a panel between two rows of a section table
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(4)
@@ -80,6 +83,8 @@ class Elements:
     residual_flexibility : int (x - middle)^2 dx/EI, m/N: what an element of constant curvature
         lacks; and that of shear.
     node_mass : (m + 1,), kg, statically equivalent to the distributed mass.
+    mass_ahead : (m + 1,), m, how far ahead of its node each hangs: an element clamped at its ends
+        bears its weight by moments there, which tips and rotations of nodes then contain.
     """
 
     stations: Array
@@ -88,6 +93,7 @@ class Elements:
     axial_stiffness: Array
     residual_flexibility: Array
     node_mass: Array
+    mass_ahead: Array
 
     @property
     def noise(self) -> float:
@@ -103,15 +109,20 @@ def discretise(
     """Cut `beam` into elements with a node at every abscissa of pins and at both ends.
 
     One mesh for each entry of `pins`; many at once take a tenth of the time of each alone. No
-    element is longer than the span over `n_elements * refinement`; pins closer than MERGE_DISTANCE
-    to another station share its node.
+    element is longer than the span over `n_elements * refinement`. Where the section varies there
+    are three or more between two pins, if none becomes shorter than MERGE_DISTANCE; pins closer
+    than that to another station share its node.
     """
     longest = (beam.span[1] - beam.span[0]) / (beam.n_elements * refinement)
-    stations = [np.array(_stations(beam.span, of_mesh, longest)) for of_mesh in pins]
+    # elements make up for each other's varying sections, see _centred
+    shortest = np.inf if np.ptp(beam.section.second_moment) == 0.0 else MERGE_DISTANCE
+    stations = [np.array(_stations(beam.span, of_mesh, longest, shortest)) for of_mesh in pins]
     return _reduce(beam, stations, pins)
 
 
-def _stations(span: tuple[float, float], pins: tuple[float, ...], longest: float) -> list[float]:
+def _stations(
+    span: tuple[float, float], pins: tuple[float, ...], longest: float, shortest: float
+) -> list[float]:
     stations = [span[0], span[1]]
     for pin in pins:
         # corners may be just as far apart, but for round-off
@@ -120,7 +131,8 @@ def _stations(span: tuple[float, float], pins: tuple[float, ...], longest: float
     stations.sort()
     mesh = [stations[0]]
     for start, end in pairwise(stations):
-        n = max(1, math.ceil((end - start) / longest - 1e-6))
+        least = max(1, min(FEWEST, int((end - start) / shortest)))
+        n = max(least, math.ceil((end - start) / longest - 1e-6))
         mesh += [start + (end - start) / n * k for k in range(1, n)] + [end]
     return mesh
 
@@ -131,24 +143,28 @@ def _centred(
     """Flexibilities of bending and their second moments, as elements of one hinge carry them.
 
     The hinge of an element is in its `middle`, that of its flexibility `off` it, m. A share of the
-    flexibility goes to the element beside it, so that where moments are linear over the two every
-    moment up to the second stays: a mesh errs by what it errs with a uniform beam. Not across nodes
-    `apart`, where forces may turn the beam; elements before `ends` are none.
+    flexibility goes to the element beside it on that side, or comes from the one on the other. All
+    elements between two of the nodes `apart`, where forces may turn the beam, bear the same force
+    across: of second moments their sum counts. So where moments are linear between those nodes
+    every moment up to the second stays, and a mesh errs by what it errs with a uniform beam.
+    Elements before `ends` are none.
     """
-    part = np.searchsorted(np.unique(apart), np.arange(len(bending)), side="right")
-    part[ends - 1] = -1 - np.arange(len(ends))
+    number = np.arange(len(bending))
+    part = np.searchsorted(np.unique(apart), number, side="right")
+    part[ends - 1] = part.max() + 1 + np.arange(len(ends))
     after = np.append(part[1:] == part[:-1], False)
     before = np.append(False, after[:-1])
     ahead = np.where(off > 0, after, ~before & after)
     to = np.where(ahead, 1, np.where(before, -1, 0))
-    other = np.arange(len(bending)) + to
+    other = number + to
     distance = np.where(to == 0, 1.0, middle[other] - middle)
     given = np.where(to == 0, 0.0, bending * off / distance)
-    most = MOST_MOVED * residual / distance**2
-    given = np.clip(given, -most, most)
+    given = np.maximum(given, -MOST_TAKEN * bending[other])
     moved = bending - given
     np.add.at(moved, other, given)
-    return moved, residual - given * distance**2
+    whole = np.bincount(part, residual)
+    left = np.maximum(whole - np.bincount(part, given * distance**2), LEAST_LEFT * whole)
+    return moved, residual * (left / np.where(whole > 0.0, whole, 1.0))[part]
 
 
 def nearest(stations: Array, abscissa: float) -> int:
@@ -184,15 +200,25 @@ def _reduce(
     apart = [begin + k for begin, at in zip(begins, numbers, strict=True) for k in (0, *at)]
     bending, residual = _centred(bending, first / bending - middle, middle, residual, apart, ends)
     found = []
+    # inwards at both ends: m L / 12 of a uniform element, and 0 where the mass lies at an end
+    turning = _ratio(at_start * at_end * length / 3, of_element)
     for of_mesh, begin, end, at in zip(stations, begins, ends, numbers, strict=True):
         of = slice(begin, end - 1)
+        mass = np.append(at_start[of], 0.0) + np.append(0.0, at_end[of])
+        inwards = np.append(turning[of], 0.0) - np.append(0.0, turning[of])
         elements = Elements(
             of_mesh,
             at,
             stiffness[of] / bending[of],
             stiffness[of] / axial[of],
             residual[of] / beam.youngs_modulus,
-            np.append(at_start[of], 0.0) + np.append(0.0, at_end[of]),
+            mass,
+            _ratio(inwards, mass),
         )
         found.append(elements)
     return found
+
+
+def _ratio(moment: Array, mass: Array) -> Array:
+    """Their ratio, 0 where there is no mass."""
+    return np.divide(moment, mass, out=np.zeros(len(mass)), where=mass > 0.0)

@@ -189,12 +189,12 @@ def places_of(beam: bodies.Beam, stations: Array) -> Array:
     return np.column_stack([np.interp(stations, at, corners[:, k]) for k in (0, 1)])
 
 
-def mass_offset(beam: bodies.Beam, mesh: Elements) -> Array:
-    """Where the mass of every node lies from it, (2,) in m, in the frame of the body."""
+def hung_at(beam: bodies.Beam, mesh: Elements) -> Array:
+    """Where the masses of the nodes hang, (m + 1, 2) in m, in the frame of the body."""
+    places = places_of(beam, mesh.stations + mesh.mass_ahead)
     if beam.centre is None:
-        return np.zeros(2)
-    on_axis = mesh.node_mass @ places_of(beam, mesh.stations) / mesh.node_mass.sum()
-    return np.array(beam.centre) - on_axis
+        return places
+    return places + (np.array(beam.centre) - mesh.node_mass @ places / mesh.node_mass.sum())
 
 
 def _seen_from(outer: Array, inner: Array, point: Array) -> Array:

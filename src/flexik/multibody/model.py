@@ -25,7 +25,7 @@ from flexik.multibody.elements import (
     spring,
     weigh,
 )
-from flexik.multibody.flexible import FlexibleMachine, failed, feet_of, mass_offset, places_of
+from flexik.multibody.flexible import FlexibleMachine, failed, feet_of, hung_at, places_of
 from flexik.multibody.newton import solved, solved_exactly, static_settings
 
 # Newton's residual over the weight of machine and payload; and, where that is less, over the forces
@@ -33,7 +33,6 @@ from flexik.multibody.newton import solved, solved_exactly, static_settings
 TOLERANCE, LAST_DIGITS = 1e-6, 1.5
 # Step of the payload, as a share of it, below which a stubborn equilibrium is given up
 SMALLEST_RAMP = 1e-4
-
 Method = Callable[[exu.MainSystem, exu.SimulationSettings], bool]
 
 
@@ -105,7 +104,10 @@ class PlanarModel:
         for name, mesh in meshes.items():
             self._noise[name] = mesh.noise
             self.beams[name].reshape(mesh, places_of(self.machine.beams[name], mesh.stations))
-            for load, mass in zip(self._weights[name], mesh.node_mass, strict=True):
+            points = hung_at(self.machine.beams[name], mesh)
+            hung = zip(self._weights[name], points, mesh.node_mass, strict=True)
+            for (marker, load), point, mass in hung:
+                self.beams[name].slide_to(marker, point)
                 weigh(self.system, load, mass, self.machine.gravity)
         for (_, pair, _), markers, at in zip(self.flexible.pads, self._pads, touched, strict=True):
             for name, marker, point in zip(reversed(pair), markers, at, strict=True):
@@ -163,11 +165,10 @@ class PlanarModel:
 
         Raises SolverError, which names coordinates and payload, where there is none.
         """
-        if self._solved_with(payload):
-            return
-        self._unload()
-        if self._solved_with(payload):
-            return
+        for _ in range(2):
+            if self._solved_with(payload):
+                return
+            self._unload()
         reached = self._ramped(payload)
         if reached < payload:
             self._unload()
@@ -189,7 +190,6 @@ class PlanarModel:
 
         Less than 0 if not even itself.
         """
-        self._unload()
         if not self._solved_with(0.0, solved_exactly):
             return -1.0
         on, step = 0.0, payload / 2
@@ -375,13 +375,13 @@ class PlanarModel:
                 self._hold(*self.machine.joints[drive.joint].of)
         return rods
 
-    def _weigh_beam(self, name: str, mesh: Elements) -> list[int]:
-        """Hang the mass of a beam on its nodes; returns the loads."""
-        beam, placed = self.machine.beams[name], self.beams[name]
-        offset, gravity = mass_offset(beam, mesh), self.machine.gravity
-        points = placed.places + offset
-        pairs = zip(mesh.stations, points, mesh.node_mass, strict=True)
-        return [hang(self.system, placed.marker_at(x, p), mass, gravity) for x, p, mass in pairs]
+    def _weigh_beam(self, name: str, mesh: Elements) -> list[tuple[int, int]]:
+        """Hang the mass of a beam on its nodes; returns markers and loads."""
+        found, points = [], hung_at(self.machine.beams[name], mesh)
+        for station, point, mass in zip(mesh.stations, points, mesh.node_mass, strict=True):
+            marker = self.beams[name].marker_at(station, point)
+            found.append((marker, hang(self.system, marker, mass, self.machine.gravity)))
+        return found
 
     def _weigh_others(self) -> None:
         for name, body in self.machine.bodies.items():

@@ -67,9 +67,9 @@ def solved_exactly(system: exu.MainSystem, settings: exu.SimulationSettings) -> 
             return False
         if np.linalg.norm(left) < settings.staticSolver.newton.absoluteTolerance:
             return True
-        columns = [residual(x + moved) - left for moved in np.diag(steps)]
+        columns = [residual(x + by) - residual(x - by) for by in np.diag(steps)]
         try:
-            x = x - np.linalg.solve((np.array(columns) / steps[:, None]).T, left)
+            x = x - np.linalg.solve((np.array(columns) / (2 * steps[:, None])).T, left)
         except np.linalg.LinAlgError:
             return False
     return False
