@@ -42,7 +42,8 @@ def test_springs_are_the_inner_bodys_whatever_the_angle_of_the_joint(springs, an
     flexibility = np.outer(x, x) / springs.get("x", np.inf)
     flexibility += np.outer(y, y) / springs.get("y", np.inf)
     expected = flexibility @ [0.0, -10 * G]
-    assert sag(tips, given, values=np.array([turned])) == pytest.approx(expected, rel=2e-3, abs=2e-6)
+    found = sag(tips, given, values=np.array([turned]))
+    assert found == pytest.approx(expected, rel=2e-3, abs=2e-6)
 
 
 def lifted(element, kind, direction=0.0, turned=0.0):
