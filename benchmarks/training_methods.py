@@ -61,7 +61,7 @@ RATES = {
 TIMES = (1.0, 10.0, 60.0)  # s, columns of the table
 
 # the published schedule and the accelerated one end by their own rules, back-propagation by time
-LONG = BackPropagation(n_iterations=10**9, minimum_gradient=0.0)
+LONG = BackPropagation(n_iterations=10**7, minimum_gradient=0.0)
 METHODS: dict[str, Stopping] = {
     "Levenberg-Marquardt": LevenbergMarquardt(minimum_progress=1e-4),
     "Levenberg-Marquardt, accelerated": LevenbergMarquardtAccelerated(),
