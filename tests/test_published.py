@@ -54,7 +54,7 @@ def test_largest_published_error_is_that_of_a_point_beside_ours(published):
     largest, vertical = published.loc[["max_error", "max_abs_dy"], "none"]
     assert np.hypot(x, y) == pytest.approx(largest, rel=0.015)
     assert y == pytest.approx(vertical, rel=0.01)
-    assert x == pytest.approx(np.sqrt(largest**2 - vertical**2), abs=2.0)
+    assert x == pytest.approx(np.sqrt(largest**2 - vertical**2), abs=3.0)
 
 
 def test_spring_is_the_one_of_the_report(metrics):
