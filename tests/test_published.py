@@ -31,7 +31,7 @@ def published():
     [
         ("max_abs_dx", 0.1),
         ("max_abs_dy", 0.1),
-        ("max_error", 0.11),  # 10.5 %, a matter of the points: see the next test
+        ("max_error", 0.112),  # 11.1 %, 10.5 % with a straight pillar: see the next test
         ("mean_abs_dx", 0.1),
         ("mean_abs_dy", 0.1),
         ("mean_error", 1e-5),  # fitted
