@@ -125,7 +125,7 @@ def _drawn(
     print(f"points: {np.sum(~reached)} of {len(reached)} are left out, a method fails there")
     named = np.flatnonzero(reached[: len(study.named)])
     others = len(study.named) + np.flatnonzero(reached[len(study.named) :])
-    n_drawn, generator = n_points - len(named), np.random.default_rng(study.seed)
+    n_drawn, generator = max(0, n_points - len(named)), np.random.default_rng(study.seed)
     if len(others) < n_drawn:
         raise ParameterError(
             f"crane.studies.points.x: expected {n_drawn} or more whole metres that all methods "
@@ -153,7 +153,10 @@ def _candidates(manipulator: CraneManipulator, study: PointStudy) -> list[tuple[
 
 
 def _fitted(springs: Array, errors: list[Array], mean: float) -> tuple[float, Array]:
-    """Stiffness with which the mean of `errors` (..., 2), given by spring, is `mean` m; those."""
+    """Stiffness with which the mean of `errors` (..., 2), given by spring, is `mean` m; those.
+
+    Within a third of the least and three times the largest of `springs`.
+    """
     compliance = 1.0 / springs
     weights = np.linalg.inv(np.vander(compliance, len(springs), increasing=True))
 
@@ -166,7 +169,8 @@ def _fitted(springs: Array, errors: list[Array], mean: float) -> tuple[float, Ar
         return float(np.hypot(error[..., 0], error[..., 1]).mean()) - mean
 
     low, high = compliance.min() / 3, compliance.max() * 3
-    if not excess(low) < 0 < excess(high):
-        raise ParameterError(f"crane.studies.points: no spring gives a mean error of {mean:g} m")
-    found = float(brentq(excess, low, high))
+    if excess(low) < 0 < excess(high):
+        found = float(brentq(excess, low, high))
+    else:  # points that sag too much or too little on any spring: the nearest one
+        found = float(low if excess(low) > 0 else high)
     return 1.0 / found, at(found)
