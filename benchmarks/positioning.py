@@ -16,18 +16,15 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from flexik import stage
 from flexik.cases.case import load
 from flexik.cases.crane.report_results import query_key
-from flexik.datasets.tables import read_table
 from flexik.errors import DataError
 from flexik.evaluation.conditions import Conditions
 from flexik.kinematics.crane_manipulator import CraneManipulator
-from flexik.planar.conditions import at, at_points
-from flexik.planar.fields import QUERY, target_fields
+from flexik.planar.conditions import at_points, at_targets
 from flexik.planar.methods import method_of
 from flexik.positioning.method import Method
 from flexik.reporting.tables import Table
@@ -54,14 +51,11 @@ def cases() -> dict[str, Case]:
     section = load("crane")
     manipulator = CraneManipulator(section.geometry)
     try:
-        table = read_table(
-            section.data / "samples/workspace.parquet", target_fields(section.machine)
-        )
+        targets = section.data / "samples/workspace.parquet"
+        batch = at_targets(targets, section.machine, manipulator)
         methods = {name: method_of(section, name) for name in section.methods}
     except DataError as error:
         raise DataError(f"run `make repro` first: {error}") from error
-    queries = table[[field.name for field in QUERY]].to_numpy()
-    batch = at(queries, np.arange(len(queries)), manipulator)
     single = at_points(section.conditions["published"], manipulator)
     return {
         name: Case(method, single, batch[: section.methods[name].n_targets])

@@ -53,6 +53,22 @@ class Beam:
         k = np.clip(np.searchsorted(knots, abscissa, side="right") - 1, 0, len(knots) - 2)
         return sums[:, k] + self._between(knots[k], abscissa)
 
+    def masses(
+        self, start: Array, length: Array, integrals: Sequence[Array], total: Array
+    ) -> tuple[Array, Array]:
+        """Masses in kg of pieces of the beam, and what of each its second end bears.
+
+        start, length : of the pieces, m.
+        integrals, total : A, Ax, Ax2 of each piece and of the beam, see `integrals`.
+        """
+        area, area_x, area_xx = integrals
+        # density follows the area, times a linear factor
+        mass = [self.mass, self.mass * self.centre_of_mass]
+        factor = np.linalg.solve([total[:2], total[1:]], mass)
+        of_piece = factor[0] * area + factor[1] * area_x
+        turning = factor[0] * area_x + factor[1] * area_xx - start * of_piece
+        return of_piece, np.divide(turning, length, out=np.zeros_like(turning), where=length != 0.0)
+
     @cached_property
     def _panels(self) -> tuple[Array, Array]:
         """Abscissas (m,) where an integrand has a kink, and the integrals (7, m) up to there."""
@@ -185,12 +201,7 @@ def _reduce(
     bending, first, second, axial, area, area_x, area_xx = np.diff(sums, append=0.0)
     length, middle = np.diff(nodes, append=0.0), (nodes + np.append(nodes[1:], 0.0)) / 2
     residual = second - 2 * middle * first + middle**2 * bending + beam.shear * axial
-    # density follows the area, times a linear factor
-    total = sums[4:, ends[0] - 1]
-    mass = [beam.mass, beam.mass * beam.centre_of_mass]
-    factor = np.linalg.solve([total[:2], total[1:]], mass)
-    of_element = factor[0] * area + factor[1] * area_x
-    at_end = (factor[0] * area_x + factor[1] * area_xx - nodes * of_element) / length
+    of_element, at_end = beam.masses(nodes, length, (area, area_x, area_xx), sums[4:, ends[0] - 1])
     at_start, stiffness = of_element - at_end, beam.youngs_modulus * length
     numbers = [
         tuple(nearest(of_mesh, pin) for pin in at)

@@ -74,14 +74,9 @@ class Span:
     @cached_property
     def node_mass(self) -> Array:
         """Masses (n, m) in kg of the nodes, statically those of the panels."""
-        area, area_x, area_xx = self.integrals[4:]
-        whole = self.integrals[4:].sum(axis=2)[:, 0]
-        mass = self.along.mass * np.array([1.0, self.along.centre_of_mass])
-        factor = np.linalg.solve([whole[:2], whole[1:]], mass)
-        of_panel = factor[0] * area + factor[1] * area_x
-        length = np.diff(self.x, axis=1)
-        at_end = factor[0] * area_x + factor[1] * area_xx - self.x[:, :-1] * of_panel
-        at_end = np.where(length > SAME, at_end / np.maximum(length, SAME), 0.0)
+        integrals, length = self.integrals[4:], np.diff(self.x, axis=1)
+        total = integrals.sum(axis=2)[:, 0]
+        of_panel, at_end = self.along.masses(self.x[:, :-1], length, [*integrals], total)
         found = np.zeros_like(self.x)
         found[:, :-1] += of_panel - at_end
         found[:, 1:] += at_end

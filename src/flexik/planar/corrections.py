@@ -10,15 +10,14 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from flexik.datasets.parts import Part, Work, rows
-from flexik.datasets.tables import Field, read_table
+from flexik.datasets.tables import Field
 from flexik.evaluation.conditions import Conditions
 from flexik.evaluation.errors import Judge, evaluate, tip_judge, workspace_statistics
 from flexik.kinematics.machine_file import manipulator_of
 from flexik.machines.planar import PlanarMachine
 from flexik.multibody.planar import tips
-from flexik.planar.conditions import at
+from flexik.planar.conditions import at_targets
 from flexik.planar.constants import model_inputs
-from flexik.planar.fields import QUERY, target_fields
 from flexik.planar.machine import columns_of, flexible
 from flexik.planar.methods import method_inputs, method_settings, trained_method
 from flexik.planar.section import CorrectionStudy, PlanarSection
@@ -63,9 +62,7 @@ def prepare(
 ) -> Work:
     """A method with a number of corrections is an item."""
     built, manipulator = flexible(machine, constants), manipulator_of(machine)
-    frame = read_table(targets, target_fields(machine))[:n_targets]
-    query = frame[[field.name for field in QUERY]].to_numpy()
-    conditions = at(query, np.arange(len(query)), manipulator)
+    conditions = at_targets(targets, machine, manipulator, n_targets)
     items = []
     for name, given in methods.items():
         for n in n_corrections:

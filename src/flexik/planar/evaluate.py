@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from flexik.datasets.parts import Part, Work, Writer, stacked, table
-from flexik.datasets.tables import Field, read_table
+from flexik.datasets.tables import Field
 from flexik.evaluation.conditions import Conditions
 from flexik.evaluation.errors import Judge, evaluate, fields_of, statistics, tip_judge
 from flexik.kinematics.machine_file import manipulator_of
@@ -22,9 +22,8 @@ from flexik.learning.storage import TrainingRecord, load_networks
 from flexik.machines.planar import PlanarMachine
 from flexik.multibody.planar import tips
 from flexik.parameters.conditions import Points
-from flexik.planar.conditions import at, at_points
+from flexik.planar.conditions import at_points, at_targets
 from flexik.planar.constants import model_inputs
-from flexik.planar.fields import QUERY, target_fields
 from flexik.planar.machine import columns_of, flexible
 from flexik.planar.methods import method_inputs, method_settings, trained_method
 from flexik.planar.section import PlanarSection
@@ -98,9 +97,7 @@ def prepare(
         conditions = at_points(points, manipulator)
     else:
         assert targets is not None
-        frame = read_table(targets, target_fields(machine))[:n_targets]
-        query = frame[[field.name for field in QUERY]].to_numpy()
-        conditions = at(query, np.arange(len(query)), manipulator)
+        conditions = at_targets(targets, machine, manipulator, n_targets)
     built = flexible(machine, constants)
     with_network = functools.partial(
         trained_method,

@@ -24,7 +24,6 @@ from flexik.learning.training import Architecture, Lesson, train_best
 from flexik.machines.planar import PlanarMachine
 from flexik.parameters.networks import Learner, Network, Regressor, TorchModule
 from flexik.planar import samples
-from flexik.planar.constants import model_inputs
 from flexik.planar.fields import PAYLOAD, kept, sample_fields
 from flexik.planar.learning import Kind, Predictor, kind_of, pair
 from flexik.planar.section import LearningCurves, PlanarSection, Selection
@@ -63,21 +62,7 @@ def parts(section: PlanarSection, study: LearningCurves | None) -> list[Part]:
             for number, given in enumerate([between, *((p, p) for p in study.outside)])
         },
     }
-    shared = {
-        "case": section.name,
-        "machine": section.machine,
-        "minimum_tip_x": section.samples.minimum_tip_x,
-        "maximum_failed_share": section.samples.maximum_failed_share,
-    }
-    solved = [
-        Part(
-            f"{FOLDER}/{name}",
-            samples.prepare,
-            {**shared, "name": f"{FOLDER}/{name}", "drawn": given},
-            model_inputs(section),
-        )
-        for name, given in drawn.items()
-    ]
+    solved = [samples.part(section, f"{FOLDER}/{name}", given) for name, given in drawn.items()]
     return [*solved, *(_part(section, study, name) for name in study.networks)]
 
 

@@ -36,16 +36,20 @@ SHOWN_FAILURES = 10
 def parts(section: PlanarSection) -> list[Part]:
     """`grid` and `selection`, tables of sample_fields."""
     given = section.samples
-    shared = {
+    return [part(section, "grid", given.grid), part(section, "selection", given.selection)]
+
+
+def part(section: PlanarSection, name: str, drawn: Mapping[str, Axis] | Selection) -> Part:
+    """The table `name` of the samples `drawn`."""
+    settings = {
         "case": section.name,
         "machine": section.machine,
-        "minimum_tip_x": given.minimum_tip_x,
-        "maximum_failed_share": given.maximum_failed_share,
+        "minimum_tip_x": section.samples.minimum_tip_x,
+        "maximum_failed_share": section.samples.maximum_failed_share,
+        "name": name,
+        "drawn": drawn,
     }
-    return [
-        Part(name, prepare, {**shared, "name": name, "drawn": drawn}, model_inputs(section))
-        for name, drawn in (("grid", given.grid), ("selection", given.selection))
-    ]
+    return Part(name, prepare, settings, model_inputs(section))
 
 
 def prepare(

@@ -17,8 +17,8 @@ from flexik.positioning.method import (
     Answer,
     Array,
     Network,
-    checked,
     planar,
+    predicted,
     rigid_inverse,
     take_network,
 )
@@ -65,8 +65,8 @@ class Combined:
         deflection, rows = np.zeros_like(targets), np.arange(len(targets))
         diagnostics = {f"first_{name}": found for name, found in first.diagnostics.items()}
         for _ in range(self.n_corrections):
-            inputs, goal = np.column_stack([values[rows], payload[rows]]), targets[rows]
-            found = checked("predicted deflection", self.network.predict(inputs), *goal.shape)
+            goal = targets[rows]
+            found = predicted(self.network, "deflection", values[rows], payload[rows], 2)
             last = self.manipulator.inverse(goal - found, values[rows], goal)
             for name, of_rows in last.diagnostics.items():
                 diagnostics.setdefault(f"corrected_{name}", of_rows.copy())[rows] = of_rows

@@ -147,6 +147,17 @@ def rigid_inverse(manipulator: Manipulator, targets: Array, current: Array) -> R
     return manipulator.inverse(targets, current)
 
 
+def predicted(
+    network: Network, what: str, values: Array, payload: Array, n_outputs: int | None
+) -> Array:
+    """Outputs (n, n_outputs) of `network` at coordinates (n, k) and payload (n,) in kg.
+
+    Raises PositioningError, which names `what`, if they are not finite or of another shape.
+    """
+    found = network.predict(np.column_stack([values, payload]))
+    return checked(f"predicted {what}", found, len(values), n_outputs)
+
+
 def checked(name: str, values: ArrayLike, *shape: int | None) -> Array:
     """`values` as finite float64 of `shape` (None fits any length), or a PositioningError."""
     array = np.asarray(values, dtype=float)

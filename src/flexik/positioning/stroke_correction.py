@@ -15,8 +15,8 @@ from flexik.positioning.method import (
     Answer,
     Array,
     Network,
-    checked,
     planar,
+    predicted,
     rigid_inverse,
     take_network,
 )
@@ -47,8 +47,7 @@ class StrokeCorrection:
         """See `flexik.positioning.method.Method`."""
         targets, payload = planar(query)
         rigid = rigid_inverse(self.manipulator, targets, current)
-        shift = self.network.predict(np.column_stack([rigid.values, payload]))
-        shift = checked("predicted shift", shift, len(targets), None)
+        shift = predicted(self.network, "shift", rigid.values, payload, None)
         shift[~rigid.reached] = 0.0
         wanted = rigid.values + np.pad(shift, ((0, 0), (0, current.shape[1] - shift.shape[1])))
         values = np.clip(wanted, self.manipulator.lower, self.manipulator.upper)

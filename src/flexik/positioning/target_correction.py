@@ -16,8 +16,8 @@ from flexik.positioning.method import (
     Answer,
     Array,
     Network,
-    checked,
     planar,
+    predicted,
     rigid_inverse,
     take_network,
 )
@@ -48,8 +48,7 @@ class TargetCorrection:
         """See `flexik.positioning.method.Method`."""
         targets, payload = planar(query)
         first = rigid_inverse(self.manipulator, targets, current)
-        inputs = np.column_stack([first.values, payload])
-        shift = checked("predicted shift", self.network.predict(inputs), *targets.shape)
+        shift = predicted(self.network, "shift", first.values, payload, 2)
         last = self.manipulator.inverse(targets + shift, first.values, targets)
         status = np.where(first.reached, last.status, first.status)
         values = np.where((status == REACHED)[:, None], last.values, first.values)

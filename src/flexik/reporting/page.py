@@ -98,7 +98,8 @@ def render(
         return f"\n![{alternative}]({quote(f'figures/{name}.png')})\n\n*{caption}*\n"
 
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(path.parent),
+        # its own templates first, then those that cases share
+        loader=jinja2.FileSystemLoader([path.parent, Path(__file__).parent]),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

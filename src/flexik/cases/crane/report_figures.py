@@ -196,8 +196,6 @@ def _accuracy(compared: pd.DataFrame) -> Drawing:
         frames.append(known[known[panel] > 0].assign(cost=known[panel], panel=panel))
     frame = pd.concat(frames)
     frame["kind"] = frame["group"].map(FAMILIES)
-    if frame.empty:
-        return draw(chart, Layer(frame, "cost", "workspace_mean", "o"), x=X, y=Y)
     names = frame.assign(text=frame["method"].str.replace("_", " "), dx=5.0, dy=4.0, side="left")
     colours = {
         name: {"color": c} for name, c in zip(FAMILIES.values(), FAMILY_COLOURS, strict=True)

@@ -48,10 +48,6 @@ PUBLISHED = Points(
 )
 
 
-# Mean error without compensation, m, data/reference/crane/positioning_errors.csv
-PUBLISHED_MEAN = 31.9331e-3
-
-
 class Calibration(planar.Calibration):
     """Of the ground spring; conditions: what the published mean error belongs to."""
 

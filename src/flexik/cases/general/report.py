@@ -29,6 +29,7 @@ from flexik.planar.measured.report import (
 from flexik.planar.picture import moved, picture
 from flexik.planar.samples import counts
 from flexik.planar.section import OwnSamples
+from flexik.positioning.registry import about
 from flexik.reporting import curves, kinds, plane, style
 from flexik.reporting.chart import Axis
 from flexik.reporting.report import Content, Drawing, draw, write_case
@@ -298,6 +299,7 @@ def values(results: Results) -> dict[str, Any]:
         "own": results.section.samples if results.held_out else None,
         "rigid": RIGID,
         "section": results.section,
+        "about": {name: about(method) for name, method in results.section.methods.items()},
         "machine": results.section.machine,
         "judged": judged,
         "random": random,
