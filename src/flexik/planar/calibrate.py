@@ -31,17 +31,27 @@ from flexik.positioning.none import Uncompensated
 
 def parts(section: PlanarSection) -> list[Part]:
     """`constants`; nothing where none is free."""
-    calibration = section.calibration
     if not section.machine.free:
         return []
-    settings = {
+    return [Part("constants", prepare, described(section), inputs(section))]
+
+
+def described(section: PlanarSection) -> dict[str, Any]:
+    """Settings of `prepare`."""
+    points = {"conditions": section.calibration_points}
+    return {
         "machine": section.machine,
-        "calibration": calibration.model_copy(update={"conditions": section.calibration_points}),
+        "calibration": section.calibration.model_copy(update=points),
     }
-    inputs: dict[str, Any] = {"sections": section.machine.section_files}
+
+
+def inputs(section: PlanarSection) -> dict[str, Any]:
+    """Inputs of `prepare`."""
+    calibration = section.calibration
+    found: dict[str, Any] = {"sections": section.machine.section_files}
     if calibration.ranges and calibration.campaign is not None:
-        inputs["campaign"] = Path(calibration.campaign)
-    return [Part("constants", prepare, settings, inputs)]
+        found["campaign"] = Path(calibration.campaign)
+    return found
 
 
 def prepare(
@@ -58,15 +68,22 @@ def prepare(
 def _constants(
     machine: PlanarMachine, calibration: Calibration, campaign: Path | None
 ) -> dict[str, Writer]:
-    known = machine.with_constants(calibration.known)
-    found: dict[str, Any] = {"constants": calibration.known}
-    if campaign is not None:
-        found = _to_campaign(known, calibration, campaign)
-    elif calibration.ranges and isinstance(calibration.conditions, Points):
-        found = _to_mean_error(known, calibration, calibration.conditions)
+    found = fitted(machine, calibration, campaign)
     for key, value in found["constants"].items():
         print(f"{key} {value:.6g}" + (", as given" if key in calibration.known else ""))
     return {".json": json_file(found)}
+
+
+def fitted(
+    machine: PlanarMachine, calibration: Calibration, campaign: Path | None
+) -> dict[str, Any]:
+    """`constants` that are given or fitted, and what the fit leaves."""
+    known = machine.with_constants(calibration.known)
+    if campaign is not None:
+        return _to_campaign(known, calibration, campaign)
+    if calibration.ranges and isinstance(calibration.conditions, Points):
+        return _to_mean_error(known, calibration, calibration.conditions)
+    return {"constants": calibration.known}
 
 
 def _to_mean_error(

@@ -22,10 +22,10 @@ from flexik.learning.examples import Examples
 from flexik.learning.perceptron import quantities
 from flexik.learning.training import Architecture, Lesson, train_best
 from flexik.machines.planar import PlanarMachine
-from flexik.parameters.networks import Learner, Network, Regressor, TorchModule
+from flexik.parameters.networks import Regressor, TorchModule
 from flexik.planar import samples
 from flexik.planar.fields import PAYLOAD, kept, sample_fields
-from flexik.planar.learning import Kind, Predictor, kind_of, pair
+from flexik.planar.learning import Predictor, kind_of, pair
 from flexik.planar.section import LearningCurves, PlanarSection, Selection
 from flexik.planar.train import based_on, data_inputs, described
 
@@ -74,14 +74,9 @@ def read(section: PlanarSection, study: LearningCurves | None) -> pd.DataFrame:
 
 
 def _part(section: PlanarSection, study: LearningCurves, name: str) -> Part:
-    network = section.networks[name]
-    trainers = network.trainers if isinstance(network, TorchModule) else [network.trainer]
-    settings = described(section, name) | {
-        "network": network,
-        "n_restarts": min(study.n_restarts, network.n_restarts),
-        "trainers": [
-            section.trainers[trainer] for trainer in trainers if trainer in section.trainers
-        ],
+    settings = {
+        "machine": section.machine,
+        "by": learning(section, name, study.n_restarts),
         "n_samples": study.n_samples,
         "n_levels": study.n_levels,
     }
@@ -94,33 +89,29 @@ def _part(section: PlanarSection, study: LearningCurves, name: str) -> Part:
 def prepare(
     *,
     machine: PlanarMachine,
-    kind: str,
-    seed: int,
-    network: Network | Learner,
-    n_restarts: int,
-    trainers: list[Any],
+    by: Mapping[str, Any],
     n_samples: tuple[int, ...],
     n_levels: tuple[int, ...],
     grid: Path,
     selection: Path,
     samples: Path,
     judged: list[Path],
-    **model: Any,
+    constants: Path | None = None,
+    sections: object = None,
 ) -> Work:
-    """A set to learn from is an item; `model` is what `based_on` takes."""
+    """A set to learn from is an item; `by` is what `learning` tells."""
     fields = sample_fields(machine)
     drawn, whole, chosen_by, *judges = (
         kept(read_table(path, fields)) for path in (samples, grid, selection, *judged)
     )
     sets = [(RANDOM, 0, drawn[:n]) for n in n_samples]
     sets += [(LEVELS, n, with_levels(whole, n)) for n in n_levels]
-    base = based_on(machine, **model)
-    learnt = functools.partial(pair, kind=kind, machine=machine, base=base)
-    given = seed, network, n_restarts, trainers
-    learn = functools.partial(_learnt, kind_of(machine, kind), *given, learnt(chosen_by))
-    items = [(design, n_levels, len(table), learnt(table)) for design, n_levels, table in sets]
+    base = based_on(machine, by.get("theory"), by.get("n_passes", 0), constants)
+    of = functools.partial(pair, kind=by["kind"], machine=machine, base=base)
+    learn = functools.partial(learnt, by, machine, chosen=of(chosen_by))
+    items = [(design, n_levels, len(table), of(table)) for design, n_levels, table in sets]
     asked = [
-        (judge[PAYLOAD.name].iloc[0] if number else np.nan, *learnt(judge))
+        (judge[PAYLOAD.name].iloc[0] if number else np.nan, *of(judge))
         for number, judge in enumerate(judges)
     ]
     return Work(functools.partial(_judged, learn, asked), items, rows(*FIELDS))
@@ -133,23 +124,31 @@ def with_levels(table: pd.DataFrame, n_levels: int) -> pd.DataFrame:
     return table[table[PAYLOAD.name].isin(payloads[places.round().astype(int)])]
 
 
-def _learnt(
-    columns: Kind,
-    seed: int,
-    network: Any,
-    n_restarts: int,
-    trainers: list[Any],
-    chosen: Pair,
-    learnt: Pair,
-) -> Predictor:
+def learning(section: PlanarSection, name: str, n_restarts: int) -> dict[str, Any]:
+    """How network `name` learns, from `n_restarts` starts at most: what `learnt` takes."""
+    network = section.networks[name]
+    trainers = network.trainers if isinstance(network, TorchModule) else [network.trainer]
+    found = described(section, name) | {
+        "network": network,
+        "n_restarts": min(n_restarts, network.n_restarts),
+        "trainers": [section.trainers[t] for t in trainers if t in section.trainers],
+    }
+    del found["machine"]
+    return found
+
+
+def learnt(by: Mapping[str, Any], machine: PlanarMachine, grid: Pair, chosen: Pair) -> Predictor:
+    """What is learnt from `grid` and chosen by `chosen`, as `learning` tells."""
+    network, seed, n_restarts = by["network"], by["seed"], by["n_restarts"]
     if isinstance(network, Regressor):
-        return regressor.fit(network.regressor, seed, Examples(*learnt, chosen))
+        return regressor.fit(network.regressor, seed, Examples(*grid, chosen))
     if isinstance(network, TorchModule):
-        examples = Examples(*learnt, chosen)
-        return torch_module.train_best(network.module, examples, trainers, seed, n_restarts)
+        examples = Examples(*grid, chosen)
+        return torch_module.train_best(network.module, examples, by["trainers"], seed, n_restarts)
+    columns = kind_of(machine, by["kind"])
     names = quantities(columns.inputs), quantities(columns.outputs)
     architecture = Architecture(network.sizes[0], network.activation)
-    lesson = Lesson(*learnt, *names, architecture, trainers[0], seed, chosen)
+    lesson = Lesson(*grid, *names, architecture, by["trainers"][0], seed, chosen)
     return train_best(lesson, n_restarts)[0]
 
 
@@ -159,9 +158,9 @@ def _judged(
     given: tuple[str, int, int, Pair],
 ) -> Mapping[str, NDArray]:
     """A row a set of samples that judge: what is not predicted of their outputs moves the tip."""
-    design, n_levels, n_samples, learnt = given
+    design, n_levels, n_samples, grid = given
     try:
-        network = learn(learnt)
+        network = learn(grid)
     except TrainingError:  # too few samples for so many weights
         network = None
     found = []

@@ -15,7 +15,7 @@ from flexik.learning.storage import load_networks
 from flexik.learning.torch_module import code_of
 from flexik.learning.torch_storage import load_modules
 from flexik.machines.planar import PlanarMachine
-from flexik.parameters.conditions import ConditionSet, Points
+from flexik.parameters.conditions import ConditionSet, Points, RandomTargets
 from flexik.parameters.model import Count, Model, Name, NotNegative, Seed, Share
 from flexik.parameters.networks import Axis, Regressor, TorchModule, check_networks
 from flexik.parameters.section import CaseSection
@@ -137,6 +137,22 @@ class LearningCurves(Model):
     n_judged: Count = 1000
     outside: tuple[NotNegative, ...] = ()
     seed: Seed = 1
+
+
+class PhysicsStudy(Model):
+    """Variants of the machine: what is left open about it.
+
+    variants : by name, other values of dotted keys of the machine file.
+    methods : those that command each variant; with beam theory of the variant, the machine.
+    conditions : random targets, of which the first `n_targets`.
+    n_restarts : of networks that learn what the theory of a variant leaves; at most their own.
+    """
+
+    variants: Annotated[dict[Name, dict[str, Any]], Field(min_length=1)]
+    methods: Annotated[list[Name], Field(min_length=1)]
+    conditions: Name = "workspace"
+    n_targets: Count = 500
+    n_restarts: Count = 2
 
 
 class PlanarSection(CaseSection):
@@ -276,6 +292,27 @@ def check_curves(section: PlanarSection, study: LearningCurves | None) -> None:
                 f"studies.learning_curves.networks.{number}: expected a network of given size that "
                 f"learns {' or '.join(CURVES)}, got {name!r}"
             )
+
+
+def check_physics(section: PlanarSection, study: PhysicsStudy | None) -> None:
+    """Raise ValueError unless methods, conditions and keys of the variants of `study` are there."""
+    if study is None:
+        return
+    if not isinstance(section.samples, Samples):
+        raise ValueError("studies.physics: expected none, samples of a file have no model")
+    if not isinstance(section.conditions.get(study.conditions), RandomTargets):
+        raise ValueError(f"studies.physics.conditions: no random targets {study.conditions!r}")
+    for number, name in enumerate(study.methods):
+        if name not in section.methods:
+            raise ValueError(f"studies.physics.methods.{number}: there is no method {name!r}")
+    for name, keys in study.variants.items():
+        try:
+            section.machine.with_constants(keys)
+        except ParameterError as error:
+            said = str(error).removeprefix("constants: ")
+            raise ValueError(f"studies.physics.variants.{name}: {said}") from None
+        if taken := keys.keys() & set(section.machine.free):
+            raise ValueError(f"studies.physics.variants.{name}.{min(taken)}: it is fitted")
 
 
 def check(section: PlanarSection) -> None:

@@ -1,4 +1,4 @@
-"""Table and figure of planar.learning_curves: errors against samples and payload levels."""
+"""Tables and a figure of planar.learning_curves, and the table of planar.physics."""
 
 import numpy as np
 import pandas as pd
@@ -8,7 +8,8 @@ from flexik.reporting import style
 from flexik.reporting.chart import Axis, Layer
 from flexik.reporting.report import Drawing, draw
 from flexik.reporting.style import MM
-from flexik.reporting.tables import Table
+from flexik.reporting.tables import Table, mm
+from flexik.reporting.tables import table as table_of
 
 KEYS = ["network", "design", "n_samples", "n_levels"]
 TITLES = {"random": "random samples", "levels": "poses of the grid, fewer payloads"}
@@ -27,6 +28,27 @@ def table(curves: pd.DataFrame) -> Table:
     frame["learnt from"] = frame["learnt from"].map(TITLES)
     frame["payloads"] = [str(n) if n else "random" for n in frame["payloads"]]
     return Table(frame, dict.fromkeys(found.columns, 3))
+
+
+PHYSICS = {
+    "variant": "variant",
+    "constants": "constants",
+    "what": "what",
+    "mean (mm)": mm("mean_error", 3),
+    "99 % (mm)": mm("p99_error", 3),
+    "max (mm)": mm("max_error", 3),
+    "failed": "n_failed",
+}
+COMMANDS = {"nominal": "{} commands the variant", "variant": "{}, theory of the variant"}
+
+
+def physics_table(physics: pd.DataFrame) -> Table:
+    """A row for what each variant moves, and for each method's errors with it; in mm."""
+    what = [
+        subject if subject == "tip" else COMMANDS[theory].format(subject)
+        for subject, theory in zip(physics["subject"], physics["theory"], strict=True)
+    ]
+    return table_of(physics.assign(what=what), PHYSICS)
 
 
 def figure(curves: pd.DataFrame) -> Drawing:

@@ -52,8 +52,9 @@ def content(results: Measured) -> Content:
 
 def goals(results: Measured) -> dict[int, float]:
     """Mean error (m) to fall below, by number of measurements."""
-    unadapted = results.adapted["method"] == results.section.studies.measured.campaign.method
-    mean = results.adapted.loc[unadapted, "mean_error"].mean()
+    adapted, method = results.adapted, results.section.studies.measured.campaign.method
+    unadapted = (adapted["method"] == method) & (adapted["n_measurements"] == 0)
+    mean = adapted.loc[unadapted, "mean_error"].mean()
     numbers = results.section.studies.measured.adaptation.n_measurements
     return {n: goal for n, goal in {HALVES: 0.5 * mean, GOOD: GOOD_ERROR}.items() if n in numbers}
 

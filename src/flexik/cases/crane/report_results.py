@@ -23,7 +23,7 @@ from flexik.learning.perceptron import Network
 from flexik.learning.size_selection import by_size, read_layers
 from flexik.learning.torch_module import Module
 from flexik.parameters.networks import Regressor, TorchModule
-from flexik.planar import learning_curves
+from flexik.planar import learning_curves, physics
 from flexik.planar.fields import kept
 from flexik.planar.learning import correction
 from flexik.positioning.inverted_network import InvertedSettings
@@ -61,7 +61,7 @@ class Results:
     studies : frame of learning.size_selection.by_size, and the chosen size, by network.
     by_corrections, draws : tables of planar.corrections and of parts.points.
     query_times, training_curves : measured by benchmarks.
-    curves : of planar.learning_curves.
+    curves, physics : of planar.learning_curves and of planar.physics.
     """
 
     section: Section
@@ -84,6 +84,7 @@ class Results:
     training_curves: pd.DataFrame
     shape: Mapping[str, Any]
     curves: pd.DataFrame
+    physics: pd.DataFrame
 
     @property
     def methods(self) -> dict[str, Settings]:
@@ -285,6 +286,7 @@ def read(section: Section) -> Results:
         shape=read_json(data / "studies/shape.json")
         | {"exaggeration": section.studies.shape.exaggeration},
         curves=learning_curves.read(section, section.studies.learning_curves),
+        physics=physics.read(section, section.studies.physics),
     )
 
 

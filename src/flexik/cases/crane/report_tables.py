@@ -126,6 +126,7 @@ def tables(results: Results) -> dict[str, Table]:
         "training": Table(training, {"training error": 4, "selection error": 4}),
         "training_race": _race(results.training_curves),
         **({"learning_curves": curves.table(results.curves)} if len(results.curves) else {}),
+        **({"physics": curves.physics_table(results.physics)} if len(results.physics) else {}),
         "size_rules": Table(_size_rules(results), 0),
         **{f"size_selection/{k}": table(sizes, SIZES) for k, (sizes, _) in results.studies.items()},
     }

@@ -24,10 +24,12 @@ from flexik.planar.section import (
     SAME,
     CorrectionStudy,
     LearningCurves,
+    PhysicsStudy,
     PlanarNetwork,
     PlanarSection,
     check,
     check_curves,
+    check_physics,
 )
 from flexik.positioning.inverted_network import InvertedSettings
 
@@ -125,6 +127,7 @@ class Studies(Model):
     fitting: Fitting
     tolerance: ToleranceStudy
     learning_curves: LearningCurves | None = None
+    physics: PhysicsStudy | None = None
     measured: Measured
 
 
@@ -160,6 +163,7 @@ class Section(PlanarSection):
         self._check_fitting()
         self._check_methods()
         check_curves(self, self.studies.learning_curves)
+        check_physics(self, self.studies.physics)
         return self
 
     def _check_shape(self) -> None:

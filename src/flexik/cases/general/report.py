@@ -15,7 +15,7 @@ from flexik.files import read_json
 from flexik.kinematics.status import REACHED
 from flexik.machines.bodies import Beam
 from flexik.parameters.conditions import RandomTargets
-from flexik.planar import held_out, learning_curves
+from flexik.planar import held_out, learning_curves, physics
 from flexik.planar.fields import deflection
 from flexik.planar.measured.errors import campaign_errors
 from flexik.planar.measured.fields import TARGET
@@ -114,6 +114,11 @@ class Results:
         return learning_curves.read(self.section, self.section.studies.learning_curves)
 
     @cached_property
+    def physics(self) -> pd.DataFrame:
+        """What is left open about the machine, of planar.physics."""
+        return physics.read(self.section, self.section.studies.physics)
+
+    @cached_property
     def campaign(self) -> pd.DataFrame:
         """Errors of the measured points; none where nothing is measured or no targets are known."""
         found = self.measured("campaign")
@@ -182,6 +187,8 @@ def tables(results: Results) -> dict[str, Table]:
     found["networks"] = table(results.networks, {name: name for name in told} | errors)
     if len(results.curves):
         found["learning_curves"] = curves.table(results.curves)
+    if len(results.physics):
+        found["physics"] = curves.physics_table(results.physics)
     return found | {"bodies": _bodies(results.section), "drives": _drives(results.section)}
 
 

@@ -15,8 +15,10 @@ from flexik.planar.section import (
     AnySamples,
     LearningCurves,
     OwnSamples,
+    PhysicsStudy,
     PlanarSection,
     check_curves,
+    check_physics,
 )
 from flexik.positioning.registry import Methods
 
@@ -38,11 +40,13 @@ class Studies(Model):
     picture : sample that is drawn; not given: all drives in the middle of their limits, the largest
         payload of the grid.
     learning_curves : errors by number of samples; not given: none.
+    physics : what is left open about the machine; not given: nothing.
     measured : campaign on machines as built, and adaptation to it; not given: there is none.
     """
 
     picture: Picture | None = None
     learning_curves: LearningCurves | None = None
+    physics: PhysicsStudy | None = None
     measured: Measured | None = None
 
 
@@ -81,6 +85,7 @@ class Section(PlanarSection):
                     f"networks.{name}.learns: coordinates need a machine of two drives"
                 )
         check_curves(self, self.studies.learning_curves)
+        check_physics(self, self.studies.physics)
         shown = self.studies.picture
         if shown is not None and len(shown.values) != len(self.machine.drives):
             raise ValueError(f"studies.picture.values: expected {len(self.machine.drives)} of them")

@@ -4,6 +4,7 @@ import functools
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,15 +14,15 @@ from flexik.evaluation.targets import draw_candidates
 from flexik.kinematics.machine_file import manipulator_of
 from flexik.kinematics.manipulator import Manipulator
 from flexik.kinematics.status import REACHED
-from flexik.learning.storage import load_network
 from flexik.machines.planar import PlanarMachine
 from flexik.planar.machine import flexible
 from flexik.planar.measured.adapted import Adapted, Measurements, Nominal, identify, misjudged
 from flexik.planar.measured.fields import ADAPTATION, ADAPTED, MISJUDGED
-from flexik.planar.measured.nominal import asked, compensating
+from flexik.planar.measured.nominal import asked
 from flexik.planar.measured.section import Adaptation, Campaign
 from flexik.planar.measured.twins import Generator, measured_tips, twin_and_generator
-from flexik.positioning import combined
+from flexik.planar.methods import trained_method
+from flexik.positioning.combined import Combined
 from flexik.positioning.method import Array, Method, PositioningError
 
 KEY = "studies.measured.adaptation"
@@ -40,7 +41,7 @@ class Study:
     """
 
     nominal: Nominal
-    baselines: Mapping[str, Method]
+    baselines: Mapping[str, Combined]
     campaign: Campaign
     adaptation: Adaptation
 
@@ -50,19 +51,24 @@ def prepare(
     machine: PlanarMachine,
     campaign: Campaign,
     adaptation: Adaptation,
-    methods: Mapping[str, combined.Settings],
-    networks: Mapping[str, Path],
+    methods: Mapping[str, Mapping[str, Any]],
+    built_from: Mapping[str, Mapping[str, Any]],
     sections: object,
     constants: Path | None = None,
 ) -> Work:
     """A table of ADAPTATION; an item is a machine.
 
-    methods, networks : by name, of the method that is adapted and of that of the campaign.
+    methods, built_from : by name, of the method that is adapted, of that of the campaign, and of
+        the others.
     """
-    read = {name: load_network(path)[0] for name, path in networks.items()}
-    baselines = {name: compensating(machine, methods[name], read[name]) for name in methods}
-    network = read[adaptation.method]
-    nominal = Nominal(flexible(machine, constants), network, adaptation.expected)
+    built, manipulator = flexible(machine, constants), manipulator_of(machine)
+    baselines: dict[str, Any] = {
+        name: trained_method(
+            **given, manipulator=manipulator, **built_from[name], machine=built.machine
+        )
+        for name, given in methods.items()
+    }
+    nominal = Nominal(built, baselines[adaptation.method].network, adaptation.expected)
     study = Study(nominal, baselines, campaign, adaptation)
     items = range(adaptation.n_twins)
     return Work(functools.partial(errors_of, study), items, rows(*ADAPTATION))
@@ -81,7 +87,9 @@ def errors_of(study: Study, number: int) -> Columns:
     strokes = commanded(machine, first, learn)
     tips = measured_tips(twin, {"": strokes}, learn[:, 2], study.campaign.noise, generator)
     learnt = Measurements(strokes, learn[:, 2], tips[""])
-    methods = {(name, 0): method for name, method in study.baselines.items()}
+    methods: dict[tuple[str, int], Method] = {
+        (name, 0): method for name, method in study.baselines.items()
+    }
     methods |= adapted_methods(study, learnt)
     commands = {kind: commanded(machine, method, judge) for kind, method in methods.items()}
     reached = measured_tips(twin, commands, judge[:, 2], None, generator)
@@ -110,6 +118,10 @@ def adapted_methods(study: Study, learnt: Measurements) -> dict[tuple[str, int],
             nominal = replace(study.nominal, expected=expected)
             offsets = identify(nominal, learnt[:n])
             found[name, n] = Adapted(nominal, offsets, settings.n_corrections)
+    for name in settings.others:
+        nominal = replace(study.nominal, network=study.baselines[name].network)
+        offsets = identify(nominal, learnt)
+        found[name, len(learnt.payload)] = Adapted(nominal, offsets, settings.n_corrections)
     return found
 
 

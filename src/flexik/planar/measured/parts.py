@@ -6,7 +6,7 @@ from flexik.datasets.parts import Part
 from flexik.planar.constants import model_inputs
 from flexik.planar.measured import adaptation, budget, campaign, identified
 from flexik.planar.measured.section import Measured
-from flexik.planar.methods import method_settings
+from flexik.planar.methods import method_inputs, method_settings
 from flexik.planar.section import PlanarSection
 
 
@@ -28,6 +28,8 @@ def measured_parts(section: PlanarSection, measured: Measured) -> list[Part]:
     if measured.campaign.file is not None:
         file = {"file": measured.campaign.file}
         made = Part("measured/campaign", campaign.prepare_own, {"machine": machine}, file)
+    # the one that is adapted comes first
+    judged = list(dict.fromkeys([*reversed(names.values()), *measured.adaptation.others]))
     learning: dict[str, Any] = {
         "machine": machine,
         "method": adapted,
@@ -38,18 +40,17 @@ def measured_parts(section: PlanarSection, measured: Measured) -> list[Part]:
         "machine": machine,
         "campaign": built,
         "adaptation": measured.adaptation,
-        # the one that is adapted comes first
-        "methods": {name: methods[name] for name in reversed(names.values())},
+        "methods": {name: method_settings(section, name) for name in judged},
     }
-    networks = {name: trained_in / f"{given.network}.json" for name, given in methods.items()}
+    read = {name: method_inputs(section, name) for name in judged}
     other = model | {
-        "network": networks[names["adaptation"]],
+        "network": trained_in / f"{adapted.network}.json",
         "campaign": section.data / "studies/measured/campaign.parquet",
     }
     found = [
         made,
         Part("measured/identified", identified.prepare, learning, other),
-        Part("measured/adaptation", adaptation.prepare, judging, model | {"networks": networks}),
+        Part("measured/adaptation", adaptation.prepare, judging, model | {"built_from": read}),
     ]
     if measured.budget is not None:
         every = inputs | ({} if restarts is None else {"restarts": restarts})

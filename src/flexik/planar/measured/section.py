@@ -16,8 +16,12 @@ from flexik.parameters.model import (
     Seed,
     check_increase,
 )
+from flexik.positioning import beam_model, beam_network
 from flexik.positioning.combined import Settings as Combined
 from flexik.positioning.method import Settings
+
+# Methods that can be adapted: what they predict is a deflection of the nominal machine
+ADAPTED = (Combined, beam_model.Settings, beam_network.Settings)
 
 
 class Campaign(Points):
@@ -71,6 +75,8 @@ class Adaptation(Model):
     """Machines as built that are adapted, measurements for it, and targets to judge by.
 
     method : what is corrected, of kind combined
+    others : methods that are judged too, as they are and with the most measurements; of kind
+        combined, beam_model or beam_network
     n_twins : machines as built
     n_measurements : how many are learnt from, in increasing order
     n_targets : others, to judge by, on each machine
@@ -84,6 +90,7 @@ class Adaptation(Model):
     """
 
     method: Name
+    others: list[Name] = []  # noqa: RUF012
     n_twins: Count
     n_measurements: Annotated[list[Annotated[int, Field(ge=3)]], Field(min_length=1)]
     n_targets: Count
@@ -128,9 +135,15 @@ class Measured(Model):
     def check_methods(self, methods: Mapping[str, Settings]) -> None:
         """Raise ValueError unless those that it names are among `methods`, of kind combined."""
         known = [name for name, given in methods.items() if isinstance(given, Combined)]
-        for key, name in self.methods.items():
+        adapted = [name for name, given in methods.items() if isinstance(given, ADAPTED)]
+        asked = [(f"{key}.method", name, known) for key, name in self.methods.items()]
+        asked += [
+            (f"adaptation.others.{number}", name, adapted)
+            for number, name in enumerate(self.adaptation.others)
+        ]
+        for key, name, known in asked:
             if name not in known:
                 raise ValueError(
-                    f"studies.measured.{key}.method: {name!r} is none of the methods that serve, "
+                    f"studies.measured.{key}: {name!r} is none of the methods that serve, "
                     f"{', '.join(known) or 'of which there is none'}"
                 )

@@ -3,7 +3,7 @@
 from flexik.cases.crane.parts import fitting, mesh, points, tolerance
 from flexik.cases.crane.section import Section
 from flexik.datasets.parts import Part
-from flexik.planar import corrections, learning_curves, shape
+from flexik.planar import corrections, learning_curves, physics, shape
 from flexik.planar.measured.parts import measured_parts
 
 
@@ -14,5 +14,6 @@ def parts(section: Section) -> list[Part]:
     nominal = [study.part(section) for study in (mesh, fitting, tolerance, points)]
     nominal.append(corrections.part(section, section.studies.corrections))
     curves = learning_curves.parts(section, section.studies.learning_curves)
+    curves += physics.parts(section, section.studies.physics)
     measured = measured_parts(section, section.studies.measured)
     return [drawn, *nominal, *curves, *measured]

@@ -88,7 +88,10 @@ def errors(
     arm = flexible_arm(machine)
     method: Method
     if build is not None:
-        method = build(settings, Ingredients(arm.geometry, trained.network if trained else None))
+        method = build(
+            settings,
+            Ingredients(arm.geometry, trained.network if trained else None, machine=machine),
+        )
     else:
         assert trained is not None and deformation is not None  # the section sees to it
         inputs = KINDS[trained.settings.learns].inputs
