@@ -28,6 +28,9 @@ FAMILIES = {
     "variants": "variants",
     "beyond": "beyond the thesis",
 }
+# Points a decade of the axes of that picture, and of its letters
+LABEL_SCALE, LABEL_WIDTH, LABEL_HEIGHT = np.array([45.0, 75.0]), 4.0, 8.5
+LEAST = 1e-5  # mm; smaller errors are drawn as this
 FAMILY_COLOURS = (style.VERMILION, style.ORANGE, style.GREY, style.BLUE)
 
 
@@ -196,23 +199,49 @@ def _accuracy(compared: pd.DataFrame) -> Drawing:
         frames.append(known[known[panel] > 0].assign(cost=known[panel], panel=panel))
     frame = pd.concat(frames)
     frame["kind"] = frame["group"].map(FAMILIES)
-    names = frame.assign(text=frame["method"].str.replace("_", " "), dx=5.0, dy=4.0, side="left")
+    frame = frame.sort_values(["panel", "workspace_mean"], ascending=[True, False])
+    text = frame["method"].str.replace("_", " ")
+    heights = [h for _, rows in frame.groupby("panel", sort=False) for h in _label_heights(rows)]
+    names = frame.assign(text=text, dx=5.0, dy=heights, side="left")
     colours = {
         name: {"color": c} for name, c in zip(FAMILIES.values(), FAMILY_COLOURS, strict=True)
     }
+    small = {"fontsize": 7.0, "path_effects": []}
     return draw(
         chart,
         Layer(frame, "cost", "workspace_mean", "o", "kind", look={"markersize": 7.0}),
-        Layer(names, "cost", "workspace_mean", "text", text="text", look={"fontsize": 7.0}),
+        Layer(names, "cost", "workspace_mean", "text", text="text", look=small),
         x={panel: Axis(label, log=True, margin=0.15) for panel, label in costs.items()},
-        y=Axis("mean error at random targets (mm)", MM, log=True),
+        y=Axis("mean error at random targets (mm)", MM, log=True, least=LEAST),
         panel="panel",
         panels=tuple(costs),
         titles="",
         columns=2,
-        height=6.0,
+        height=8.0,
         looks=colours,
     )
+
+
+def _label_heights(rows: pd.DataFrame) -> list[float]:
+    """Points by which labels right of their dots are moved up, so that none lies on another."""
+    drawn = np.maximum(rows["workspace_mean"], LEAST / MM)
+    at = LABEL_SCALE * np.log10(np.column_stack([rows["cost"], drawn]))
+    widths = LABEL_WIDTH * rows["method"].str.len().to_numpy()
+    taken: list[tuple[float, float, float]] = []
+    found = []
+    for (x, y), width in zip(at, widths, strict=True):
+        moves = (sign * step for step in range(100) for sign in (1, -1))
+        moved = next(
+            move
+            for move in moves
+            if all(
+                abs(y + move - other) >= LABEL_HEIGHT or x >= end or x + width <= begin
+                for begin, end, other in taken
+            )
+        )
+        taken.append((x, x + width, y + moved))
+        found.append(float(moved))
+    return found
 
 
 def _comparison(results: Results) -> Drawing:
