@@ -66,7 +66,15 @@ EXCAVATOR = {
             "n_levels": [2, 4],
             "n_judged": 50,
             "outside": [4000.0],
-        }
+        },
+        "physics": {
+            "variants": {
+                "same": {"title": "another name"},
+                "softer": {"bodies.boom.youngs_modulus": 150.0e9},
+            },
+            "methods": ["none", "beam_network"],
+            "n_targets": 20,
+        },
     },
 }
 STAGES = ("generate", "train", "evaluate", "study")
@@ -164,10 +172,68 @@ def test_more_samples_give_smaller_errors(section):
     assert table["mean_error"].isna().tolist() == [True, True, False, False]
 
 
+def test_a_variant_that_is_the_same_changes_nothing(section):
+    table = physics(section, "same")
+    assert table.loc["tip", "nominal"]["max_error"] < 1e-9
+    for theory in ("nominal", "variant"):
+        found = table.loc["beam_network", theory]
+        assert found["mean_error"] == pytest.approx(beam_network(section).mean(), rel=1e-3)
+
+
+def test_a_softer_boom_moves_the_tip_and_a_network_repairs_its_theory(section):
+    table = physics(section, "softer")
+    values = table.loc["tip", "nominal"], table.loc["beam_network", "nominal"]
+    moved, trusted = (found["mean_error"] for found in values)
+    sag = np.linalg.norm(
+        deflection(kept(read_table(section.data / "samples/selection.parquet"))), axis=1
+    )
+    assert 0.05 < moved / sag.mean() < 210 / 150 - 1  # of the boom's share of the deflection
+    # what beam theory and network of the machine do not know of the variant stays as the error
+    assert trusted == pytest.approx(moved, rel=0.5)
+    assert table.loc["beam_network", "variant"]["mean_error"] < 0.1 * trusted
+    assert table.loc["none", "nominal"]["mean_error"] > sag.mean()
+
+
+def physics(section, variant):
+    table = read_table(section.data / "studies/physics.parquet")
+    assert set(table["constants"]) == {"kept"} and (table["n_failed"] == 0).all()
+    return table[table["variant"] == variant].set_index(["subject", "theory"])
+
+
+def beam_network(section):
+    return read_table(section.data / "errors/workspace/beam_network.parquet")["error"][:20]
+
+
+@pytest.mark.parametrize(
+    ("study", "message"),
+    [
+        ({"methods": ["no"]}, "studies.physics.methods.0: there is no method 'no'"),
+        ({"conditions": "few_points"}, "physics.conditions: no random targets 'few_points'"),
+        (
+            {"variants": {"wrong": {"bodies.bom.mass": 1.0}}},
+            "physics.variants.wrong: bodies.bom.mass: the machine has no such key",
+        ),
+        (
+            {"variants": {"wrong": {"bodies.boom.youngs_modulus": -1.0}}},
+            "physics.variants.wrong: bodies.boom.*youngs_modulus",
+        ),
+    ],
+)
+def test_wrong_variants_are_told(project, study, message):
+    studies = {"physics": EXCAVATOR["studies"]["physics"] | study}
+    project["params.yaml"]["excavator"] = EXCAVATOR | {"studies": studies}
+    try:
+        with pytest.raises(ParameterError, match=message):
+            cases.load("excavator")
+    finally:
+        project["params.yaml"]["excavator"] = EXCAVATOR
+
+
 def test_the_report_tells_of_all(section):
     cases.module("general", "report").report(section)
     page = (section.report / "README.md").read_text()
-    assert "## Samples that it takes" in page
+    assert "## Samples that it takes" in page and "## What the model leaves open" in page
+    assert "beam_network, theory of the variant" in (section.report / "physics.md").read_text()
     for name in ("networks", "learning_curves"):
         rows = (section.report / f"{name}.md").read_text()
         assert all(network in rows for network in ("many", "polynomial", "remainder", "layers"))
