@@ -110,6 +110,7 @@ def results():
             | {f"{what}_error": [0.03, 0.031] for what in ("mean", "max")}
         ),
         curves=pd.DataFrame(),
+        physics=pd.DataFrame(),
         query_times=pd.DataFrame(
             {"method": names, "microseconds_single": 20.0, "microseconds_batched": 2.0}
         ),

@@ -20,7 +20,8 @@ from flexik.planar.conditions import at_targets
 from flexik.planar.constants import model_inputs
 from flexik.planar.machine import columns_of, flexible
 from flexik.planar.methods import method_inputs, method_settings, trained_method
-from flexik.planar.section import CorrectionStudy, PlanarSection
+from flexik.planar.section import PlanarSection
+from flexik.planar.study_section import CorrectionStudy
 from flexik.positioning.method import Columns, Method
 
 FIELDS = (

@@ -26,7 +26,8 @@ from flexik.parameters.networks import Regressor, TorchModule
 from flexik.planar import samples
 from flexik.planar.fields import PAYLOAD, kept, sample_fields
 from flexik.planar.learning import Predictor, kind_of, pair
-from flexik.planar.section import LearningCurves, PlanarSection, Selection
+from flexik.planar.section import PlanarSection, Selection
+from flexik.planar.study_section import LearningCurves
 from flexik.planar.train import based_on, data_inputs, described
 
 Array = NDArray[np.float64]

@@ -34,7 +34,8 @@ from flexik.planar.learning import pair
 from flexik.planar.learning_curves import learning, learnt
 from flexik.planar.machine import columns_of
 from flexik.planar.methods import method_inputs, method_settings, trained_method
-from flexik.planar.section import PhysicsStudy, PlanarSection
+from flexik.planar.section import PlanarSection
+from flexik.planar.study_section import PhysicsStudy
 from flexik.positioning.method import Method
 
 KEPT, FITTED = "kept", "fitted"

@@ -11,7 +11,7 @@ from flexik.cases.crane.report_results import Results
 from flexik.kinematics.crane_manipulator import CraneManipulator
 from flexik.kinematics.status import REACHED
 from flexik.planar.fields import deflection
-from flexik.reporting import curves, kinds, plane, style
+from flexik.reporting import accuracy, curves, kinds, plane, style
 from flexik.reporting.chart import Axis, Layer, chart
 from flexik.reporting.report import Drawing, draw
 from flexik.reporting.style import MM
@@ -21,17 +21,6 @@ ERROR_ROWS = {"error_x": "dX (mm)", "error_y": "dY (mm)", "error": "R (mm)"}
 CELL = 0.25  # m, side of a square of the error map
 # Variants of a method have its hue
 VARIANTS = ("_selected", "_ga", "_gauss_newton")
-# Methods by their group, in the figure of accuracy and cost
-FAMILIES = {
-    "published": "of the thesis",
-    "selected": "the same, sizes by selection error",
-    "variants": "variants",
-    "beyond": "beyond the thesis",
-}
-# Points a decade of the axes of that picture, and of its letters
-LABEL_SCALE, LABEL_WIDTH, LABEL_HEIGHT = np.array([45.0, 75.0]), 4.0, 8.5
-LEAST = 1e-5  # mm; smaller errors are drawn as this
-FAMILY_COLOURS = (style.VERMILION, style.ORANGE, style.GREY, style.BLUE)
 
 
 def figures(results: Results) -> dict[str, Drawing]:
@@ -164,7 +153,7 @@ def _errors(results: Results) -> dict[str, Drawing]:
     shown = {name: results.workspace[name] for name in names}
     over_workspace = pd.concat(shown, names=["method"]).reset_index(level="method")
     found = {
-        "accuracy_and_cost": _accuracy(results.compare()),
+        "accuracy_and_cost": accuracy.figure(results.compare()),
         "method_comparison": _comparison(results),
         "error_map": draw(
             plane.maps,
@@ -190,68 +179,14 @@ def _errors(results: Results) -> dict[str, Drawing]:
     return found | ({"query_cost": _cost(cost, looks)} if len(cost) else {})
 
 
-def _accuracy(compared: pd.DataFrame) -> Drawing:
-    """Error at random targets against time and memory, all methods; those of the thesis apart."""
-    costs = {"microseconds": "a query in a batch (us)", "kilobytes": "numbers (kB)"}
-    frames = []
-    for panel in costs:
-        known = compared[compared["method"] != "none"].dropna(subset=[panel])
-        frames.append(known[known[panel] > 0].assign(cost=known[panel], panel=panel))
-    frame = pd.concat(frames)
-    frame["kind"] = frame["group"].map(FAMILIES)
-    frame = frame.sort_values(["panel", "workspace_mean"], ascending=[True, False])
-    text = frame["method"].str.replace("_", " ")
-    heights = [h for _, rows in frame.groupby("panel", sort=False) for h in _label_heights(rows)]
-    names = frame.assign(text=text, dx=5.0, dy=heights, side="left")
-    colours = {
-        name: {"color": c} for name, c in zip(FAMILIES.values(), FAMILY_COLOURS, strict=True)
-    }
-    small = {"fontsize": 7.0, "path_effects": []}
-    return draw(
-        chart,
-        Layer(frame, "cost", "workspace_mean", "o", "kind", look={"markersize": 7.0}),
-        Layer(names, "cost", "workspace_mean", "text", text="text", look=small),
-        x={panel: Axis(label, log=True, margin=0.15) for panel, label in costs.items()},
-        y=Axis("mean error at random targets (mm)", MM, log=True, least=LEAST),
-        panel="panel",
-        panels=tuple(costs),
-        titles="",
-        columns=2,
-        height=8.0,
-        looks=colours,
-    )
-
-
-def _label_heights(rows: pd.DataFrame) -> list[float]:
-    """Points by which labels right of their dots are moved up, so that none lies on another."""
-    drawn = np.maximum(rows["workspace_mean"], LEAST / MM)
-    at = LABEL_SCALE * np.log10(np.column_stack([rows["cost"], drawn]))
-    widths = LABEL_WIDTH * rows["method"].str.len().to_numpy()
-    taken: list[tuple[float, float, float]] = []
-    found = []
-    for (x, y), width in zip(at, widths, strict=True):
-        moves = (sign * step for step in range(100) for sign in (1, -1))
-        moved = next(
-            move
-            for move in moves
-            if all(
-                abs(y + move - other) >= LABEL_HEIGHT or x >= end or x + width <= begin
-                for begin, end, other in taken
-            )
-        )
-        taken.append((x, x + width, y + moved))
-        found.append(float(moved))
-    return found
-
-
 def _comparison(results: Results) -> Drawing:
-    labels, axes = list(results.statistics), {}
-    compared, rows = results.compared(labels), []
+    names, axes = list(results.statistics), {}
+    compared, rows = results.compared(names), []
     for what in ("mean", "max"):
         axes[what] = Axis(f"{what} R (mm)", log=True)
         values = compared.loc[f"{what}_error"].to_numpy()
         columns = {"ours": values[::2], "published": values[1::2]}
-        rows.append(pd.DataFrame({"method": labels, "what": what, **columns}))
+        rows.append(pd.DataFrame({"method": names, "what": what, **columns}))
     return draw(
         kinds.beside,
         *(pd.concat(rows, ignore_index=True), "method", "ours", "published", axes),

@@ -20,14 +20,11 @@ from flexik.parameters.model import (
 )
 from flexik.planar import section as planar
 from flexik.planar.measured.section import Measured
-from flexik.planar.section import (
-    SAME,
+from flexik.planar.section import SAME, PlanarNetwork, PlanarSection, check
+from flexik.planar.study_section import (
     CorrectionStudy,
     LearningCurves,
     PhysicsStudy,
-    PlanarNetwork,
-    PlanarSection,
-    check,
     check_curves,
     check_physics,
 )

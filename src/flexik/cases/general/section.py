@@ -11,15 +11,8 @@ from flexik.parameters.model import Model, Name, NotNegative
 from flexik.planar import section as planar
 from flexik.planar.measured.section import Measured
 from flexik.planar.own_samples import read_own
-from flexik.planar.section import (
-    AnySamples,
-    LearningCurves,
-    OwnSamples,
-    PhysicsStudy,
-    PlanarSection,
-    check_curves,
-    check_physics,
-)
+from flexik.planar.section import AnySamples, OwnSamples, PlanarSection
+from flexik.planar.study_section import LearningCurves, PhysicsStudy, check_curves, check_physics
 from flexik.positioning.registry import Methods
 
 
