@@ -27,7 +27,7 @@ def table(curves: pd.DataFrame) -> Table:
     )
     frame["learnt from"] = frame["learnt from"].map(TITLES)
     frame["payloads"] = [str(n) if n else "random" for n in frame["payloads"]]
-    return Table(frame, dict.fromkeys(found.columns, 3))
+    return Table(frame, dict.fromkeys(found.columns, 4))
 
 
 PHYSICS = {
