@@ -263,14 +263,39 @@ def test_combined_with_the_genetic_inverse_ends_near_its_tolerance(crane, query,
     assert {"first_n_generations", "corrected_n_generations"} <= diagnostics.keys()
 
 
-def test_unreachable_corrected_target_is_flagged_and_keeps_the_uncorrected_strokes(crane):
+def test_an_unreachable_corrected_target_is_flagged(crane):
     query = np.array([[2.0, -3.95, 30.0], [4.0, 1.0, 30.0]])
     start = crane.initial_positions(query[:, :2])
     # 0.1 m of lift at the lower border asks for a point below the working area
-    answer = Combined(crane, Constant((0.0, 0.1)), 2)(query, start)
-    assert (answer.status == REACHED).tolist() == [False, True]
-    assert np.array_equal(answer.values[0], crane.inverse(query[:, :2], start).values[0])
-    assert crane.forward(answer.values)[1] == pytest.approx([4.0, 0.9], abs=1e-9)
+    for n in (1, 2):
+        answer = Combined(crane, Constant((0.0, 0.1)), n)(query, start)
+        assert (answer.status == REACHED).tolist() == [False, True]
+        assert crane.forward(answer.values)[1] == pytest.approx([4.0, 0.9], abs=1e-9)
+        kept = np.array_equal(answer.values[0], crane.inverse(query[:, :2], start).values[0])
+        assert kept == (n == 1)  # further ones go as far as they can
+    assert -4.05 < crane.forward(answer.values)[0, 1] < -3.95
+
+
+def test_a_correction_that_leads_beyond_the_reach_is_halved(crane):
+    heights = np.linspace(-3.5, -4.5, 1001)
+    places = np.column_stack([np.full_like(heights, 2.0), heights])
+    lowest = heights[crane.inverse(places, np.zeros((1001, 3))).reached].min()
+
+    class Sinking:
+        """Lifts the tip the less, the lower it is."""
+
+        def predict(self, values):
+            height = crane.forward(values[:, :3])[:, 1]
+            return np.column_stack([np.zeros(len(values)), 0.035 + 0.4 * (height - lowest)])
+
+    query = np.array([[2.0, lowest + 0.05, 30.0]])
+    start = crane.initial_positions(query[:, :2])
+    assert Combined(crane, Sinking(), 1)(query, start).status[0] != REACHED
+    answer = Combined(crane, Sinking(), 50)(query, start)
+    assert answer.status[0] == REACHED
+    at = np.column_stack([answer.values, query[:, 2]])
+    found = crane.forward(answer.values) + Sinking().predict(at)
+    assert found[0] == pytest.approx(query[0, :2], abs=1e-8)
 
 
 def test_unreachable_target_stays_flagged_though_its_correction_would_reach(crane):

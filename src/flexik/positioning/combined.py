@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from flexik.kinematics.manipulator import Manipulator
+from flexik.kinematics.manipulator import Manipulator, RigidSolution
 from flexik.kinematics.status import REACHED
 from flexik.parameters.model import Count
 from flexik.positioning import method
@@ -27,6 +27,8 @@ from flexik.positioning.method import (
 CONVERGED = 1e-9
 # Corrections that do: near a fold of the linkage they shrink slowly
 MOST_CORRECTIONS = 50
+# Halvings of a correction after which the machine does not reach
+HALVINGS = 4
 
 
 class Settings(method.Settings):
@@ -48,9 +50,11 @@ class Combined:
     n_corrections : at most; one as published; more iterate towards coordinates whose own deflection
         is the one corrected.
 
-    A row that the inverse fails in any pass keeps the coordinates it had and the first failing
-    status. Diagnostics: those of the inverse with the prefixes `first_` and `corrected_` (the last
-    pass), and the predicted deflection of the last pass, `deflection_x` and `deflection_y`, m.
+    Where several are allowed, a correction that leads beyond the reach is halved: on the way there
+    a redundant machine may find a pose that sags less. A row that fails all the same, or whose
+    last correction was not whole, keeps the coordinates it had and the first failing status.
+    Diagnostics: those of the inverse with the prefixes `first_` and `corrected_` (the last pass),
+    and the predicted deflection of the last pass, `deflection_x` and `deflection_y`, m.
     """
 
     manipulator: Manipulator
@@ -63,11 +67,15 @@ class Combined:
         first = rigid_inverse(self.manipulator, targets, current)
         values, status = first.values.copy(), first.status.copy()
         deflection, rows = np.zeros_like(targets), np.arange(len(targets))
+        short = np.full(len(targets), REACHED)
         diagnostics = {f"first_{name}": found for name, found in first.diagnostics.items()}
         for _ in range(self.n_corrections):
             goal = targets[rows]
             found = predicted(self.network, "deflection", values[rows], payload[rows], 2)
             last = self.manipulator.inverse(goal - found, values[rows], goal)
+            short[rows] = last.status
+            if self.n_corrections > 1:
+                found, last = self._nearer(goal, found, deflection[rows], values[rows], last)
             for name, of_rows in last.diagnostics.items():
                 diagnostics.setdefault(f"corrected_{name}", of_rows.copy())[rows] = of_rows
             moved = np.abs(found - deflection[rows]).max(axis=1) > CONVERGED
@@ -78,8 +86,27 @@ class Combined:
             rows = rows[moved & reached]
             if not len(rows):
                 break
+        status = np.where(status == REACHED, short, status)
         diagnostics |= {"deflection_x": deflection[:, 0], "deflection_y": deflection[:, 1]}
         return Answer(values, status, diagnostics)
+
+    def _nearer(
+        self, goal: Array, found: Array, before: Array, values: Array, last: RigidSolution
+    ) -> tuple[Array, RigidSolution]:
+        """Deflections `found` and solution `last`; beyond the reach nearer to those of `before`."""
+        found, parts = found.copy(), (last.values.copy(), last.status.copy())
+        diagnostics = {name: of_rows.copy() for name, of_rows in last.diagnostics.items()}
+        for _ in range(HALVINGS):
+            beyond = parts[1] != REACHED
+            if not beyond.any():
+                break
+            found[beyond] = (found[beyond] + before[beyond]) / 2
+            nearer = goal[beyond] - found[beyond]
+            again = self.manipulator.inverse(nearer, values[beyond], goal[beyond])
+            parts[0][beyond], parts[1][beyond] = again.values, again.status
+            for name, of_rows in again.diagnostics.items():
+                diagnostics[name][beyond] = of_rows
+        return found, RigidSolution(*parts, diagnostics)
 
 
 def build(settings: Settings, ingredients: method.Ingredients) -> Combined:
