@@ -159,7 +159,7 @@ def tables(results: Results) -> dict[str, Table]:
     """By name."""
     statistics = {
         **{name: name for name in ("method",)},
-        "mean (mm)": mm("mean_error", 3),
+        "mean (mm)": mm("mean_error", 4),
         "median (mm)": mm("median_error", 3),
         "95 % (mm)": mm("p95_error", 3),
         "99 % (mm)": mm("p99_error", 3),
