@@ -141,7 +141,7 @@ def test_sentences_follow_the_data(project, page, monkeypatch, tmp_path):
     assert "No controller knows that" in page and "`combined`" in page
     assert "one layer `one_layer_" in page and "several `" in page
     assert page.count("on held-out readings, whose payloads it learnt from") == 6
-    assert page.count("told 0.05 kg more than there is") == 4
+    assert page.count("told 0.05 kg more than there is") == 5
     assert "over its 1 restarts" not in page
     assert "Layer 2: the choice is the largest that was tried." in page
     assert (
