@@ -50,6 +50,19 @@ def trained_method(
     return build(method, Ingredients(manipulator, trained, tables, machine))
 
 
+def trained_methods(
+    methods: Mapping[str, Mapping[str, Any]],
+    built_from: Mapping[str, Mapping[str, Any]],
+    manipulator: Manipulator,
+    machine: PlanarMachine,
+) -> dict[str, Method]:
+    """Methods of `method_settings` with their `method_inputs`, both by name; see trained_method."""
+    return {
+        name: trained_method(**given, manipulator=manipulator, **built_from[name], machine=machine)
+        for name, given in methods.items()
+    }
+
+
 def method_of(section: PlanarSection, name: str) -> Method:
     """Method `name` of params.yaml, read from the data of the pipeline.
 

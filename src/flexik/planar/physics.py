@@ -33,7 +33,7 @@ from flexik.planar.fields import PAYLOAD, TIP, coordinates, kept, sample_fields
 from flexik.planar.learning import pair
 from flexik.planar.learning_curves import learning, learnt
 from flexik.planar.machine import columns_of
-from flexik.planar.methods import method_inputs, method_settings, trained_method
+from flexik.planar.methods import method_inputs, method_settings, trained_method, trained_methods
 from flexik.planar.section import PlanarSection
 from flexik.planar.study_section import PhysicsStudy
 from flexik.positioning.method import Method
@@ -123,21 +123,17 @@ def prepare(
     """A variant with its constants kept or fitted is an item."""
     nominal, manipulator = known(machine, constants), manipulator_of(machine)
     tables = [kept(read_table(path, sample_fields(machine))) for path in (grid, selection)]
-    trained = {
-        name: trained_method(**given, manipulator=manipulator, **built_from[name], machine=nominal)
-        for name, given in methods.items()
-    }
+    trained = trained_methods(methods, built_from, manipulator, nominal)
     relearnt = {
         name: functools.partial(_relearnt, methods[name], manipulator, tables, by)
         for name, by in theories.items()
     }
     conditions = at_targets(targets, machine, manipulator, n_targets)
     given = Given(nominal, trained, relearnt, conditions, tables[1])
-    of_nominal = {key: _value(nominal, key) for key in machine.free}
     items = []
     for name, keys in variants.items():
         other = machine.with_constants(keys)
-        items.append((name, KEPT, other.with_constants(of_nominal)))
+        items.append((name, KEPT, known(other, constants)))
         if calibration.ranges:
             found = calibrate.fitted(other, calibration, campaign)["constants"]
             items.append((name, FITTED, other.with_constants(found)))
@@ -184,10 +180,3 @@ def _relearnt(
         grid, chosen = (pair(table, by["kind"], variant, base) for table in tables)
         network = learnt(by, variant, grid, chosen)
     return trained_method(given["method"], given["build"], manipulator, network, machine=variant)
-
-
-def _value(machine: PlanarMachine, key: str) -> Any:
-    found: Any = machine.model_dump()
-    for name in key.split("."):
-        found = found[name]
-    return found

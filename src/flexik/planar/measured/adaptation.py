@@ -21,7 +21,7 @@ from flexik.planar.measured.fields import ADAPTATION, ADAPTED, MISJUDGED
 from flexik.planar.measured.nominal import asked
 from flexik.planar.measured.section import Adaptation, Campaign
 from flexik.planar.measured.twins import Generator, measured_tips, twin_and_generator
-from flexik.planar.methods import trained_method
+from flexik.planar.methods import trained_methods
 from flexik.positioning.combined import Combined
 from flexik.positioning.method import Array, Method, PositioningError
 
@@ -62,12 +62,7 @@ def prepare(
         the others.
     """
     built, manipulator = flexible(machine, constants), manipulator_of(machine)
-    baselines: dict[str, Any] = {
-        name: trained_method(
-            **given, manipulator=manipulator, **built_from[name], machine=built.machine
-        )
-        for name, given in methods.items()
-    }
+    baselines: dict[str, Any] = trained_methods(methods, built_from, manipulator, built.machine)
     nominal = Nominal(built, baselines[adaptation.method].network, adaptation.expected)
     study = Study(nominal, baselines, campaign, adaptation)
     items = range(adaptation.n_twins)

@@ -29,7 +29,7 @@ from flexik.parameters.conditions import Points
 from flexik.planar.conditions import at_points
 from flexik.planar.constants import model_inputs
 from flexik.planar.machine import columns_of
-from flexik.planar.methods import method_inputs, method_settings, trained_method
+from flexik.planar.methods import method_inputs, method_settings, trained_methods
 from flexik.positioning.method import Method
 
 Array = NDArray[np.float64]
@@ -86,12 +86,7 @@ def prepare(
     stiffness = stiffness_of(crane)
     items = [(NONE, share * stiffness) for share in SPRINGS]
     items += [(name, stiffness) for name in study.methods]
-    trained = {
-        name: trained_method(
-            **given, manipulator=manipulator, **built_from[name], machine=crane.machine
-        )
-        for name, given in methods.items()
-    }
+    trained = trained_methods(methods, built_from, manipulator, crane.machine)
     judged = functools.partial(_judged, machine, trained, conditions)
     shape = (len(points), len(payloads), 2)
     of_none = read_csv(published, ("none",), ("statistic",)).set_index("statistic")["none"]
